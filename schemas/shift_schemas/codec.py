@@ -1,0 +1,32 @@
+"""Payloads: pydantic JSON, with an encoding that names the message and its version."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from shift_schemas.errors import MalformedMessage, malformed
+
+M = TypeVar("M", bound=BaseModel)
+VERSION = "v1"
+
+
+def encoding_of(message: type[BaseModel]) -> str:
+    """``application/json;shift.Decision.v1``."""
+    return f"application/json;shift.{message.__name__}.{VERSION}"
+
+
+def encode(message: BaseModel) -> bytes:
+    """The message as JSON."""
+    return message.model_dump_json().encode()
+
+
+def decode(kind: type[M], payload: bytes | str) -> M:
+    """The message that ``payload`` spells; :class:`MalformedMessage` says what is wrong with it."""
+    try:
+        return kind.model_validate_json(payload)
+    except ValidationError as e:
+        raise malformed(kind.__name__, e) from e
+    except (RecursionError, UnicodeError, ValueError) as e:
+        raise MalformedMessage(f"{kind.__name__}: not readable as JSON") from e

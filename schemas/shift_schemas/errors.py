@@ -1,0 +1,151 @@
+"""The error tree. Each error names the value, the rule it broke and whose fault it is.
+
+An error crosses a boundary as a :class:`Problem`; ``Problem.of`` and ``Problem.error`` are inverses,
+so a service's refusal arrives at the door as the error that it was.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+VALUE_LENGTH = 80
+"""How much of a refused value is said back: enough to find it, too little to echo an attack."""
+
+
+class FieldError(BaseModel):
+    """One thing wrong with one field."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    field: str = Field(description="Where, dotted: comprehension.duration_s.")
+    value: str = Field(description="The value that was given, shortened.")
+    rule: str = Field(description="The rule that it broke, and what to write instead.")
+
+
+class ShiftError(Exception):
+    """The root. ``kind`` is its name on the wire, ``status`` its HTTP status."""
+
+    kind: ClassVar[str] = "internal"
+    status: ClassVar[int] = 500
+    title: ClassVar[str] = "Something went wrong inside"
+
+    def __init__(self, detail: str, errors: tuple[FieldError, ...] = ()) -> None:
+        super().__init__(detail)
+        self.detail = detail
+        self.errors = errors
+
+
+class MalformedMessage(ShiftError):
+    """The peer's fault: what it sent does not follow the rules."""
+
+    kind = "malformed"
+    status = 422
+    title = "The message breaks a rule"
+
+
+class InvalidStudy(MalformedMessage):
+    """A study file or object with a mistake in it."""
+
+    kind = "invalid-study"
+    title = "The study has a mistake"
+
+
+class UnknownThing(ShiftError):
+    """A session, task, decision or recording that is not there."""
+
+    kind = "unknown"
+    status = 404
+    title = "Not there"
+
+
+class Conflict(ShiftError):
+    """An id repeated with another content, an ended session, a gaze source that was replaced."""
+
+    kind = "conflict"
+    status = 409
+    title = "Contradicts what is there"
+
+
+class TooLarge(ShiftError):
+    """A body above the limit."""
+
+    kind = "too-large"
+    status = 413
+    title = "Too large"
+
+
+class Unavailable(ShiftError):
+    """A service that does not answer, or cannot know yet. Never a statement about the thing asked for."""
+
+    kind = "unavailable"
+    status = 503
+    title = "A service does not answer or does not know yet"
+
+
+class InvalidSettings(ShiftError):
+    """Our user's fault at start: a flag, variable or file of this installation."""
+
+    kind = "invalid-settings"
+    title = "The settings have a mistake"
+
+
+class DamagedRecording(ShiftError):
+    """A recording that cannot be read further, or is not what its checksum says."""
+
+    kind = "damaged-recording"
+    status = 422
+    title = "The recording is damaged"
+
+
+_KINDS: dict[str, type[ShiftError]] = {
+    c.kind: c
+    for c in (
+        ShiftError, MalformedMessage, InvalidStudy, UnknownThing, Conflict, TooLarge, Unavailable,
+        InvalidSettings, DamagedRecording,
+    )
+}  # fmt: skip
+
+
+class Problem(BaseModel):
+    """An error as it travels (the core of RFC 9457)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: str
+    detail: str
+    errors: tuple[FieldError, ...] = ()
+
+    @classmethod
+    def of(cls, error: ShiftError) -> Problem:
+        """The travelling form of ``error``."""
+        return cls(kind=error.kind, detail=error.detail, errors=error.errors)
+
+    def error(self) -> ShiftError:
+        """The error that this was."""
+        return _KINDS.get(self.kind, ShiftError)(self.detail, self.errors)
+
+
+def shorten(value: Any) -> str:
+    """``value`` as text of at most ``VALUE_LENGTH`` characters, safe to say back."""
+    text = value if isinstance(value, str) else repr(value)
+    text = "".join(c if c.isprintable() else "�" for c in text[: VALUE_LENGTH + 1])
+    return text if len(text) <= VALUE_LENGTH else text[: VALUE_LENGTH - 1] + "…"
+
+
+def field_errors(error: ValidationError, prefix: str = "") -> tuple[FieldError, ...]:
+    """Pydantic's complaints as field errors, at most twenty of them."""
+    found = []
+    for e in error.errors(include_url=False, include_context=False)[:20]:
+        field = ".".join([*([prefix] if prefix else []), *map(str, e["loc"])]) or "body"
+        missing = e["type"] == "missing"
+        found.append(FieldError(field=shorten(field), value="" if missing else shorten(e["input"]), rule=e["msg"]))
+    return tuple(found)
+
+
+def malformed(what: str, error: ValidationError) -> MalformedMessage:
+    """A :class:`MalformedMessage` that says what is wrong with ``what``."""
+    errors = field_errors(error)
+    first = errors[0]
+    return MalformedMessage(f"{what}: {first.field}: {first.rule}", errors)

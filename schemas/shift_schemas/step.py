@@ -1,0 +1,60 @@
+"""What a core gives back: the fold ``step(state, message) -> (state, facts)`` in one small type.
+
+Pure. Cores import this and nothing of the runtime; the runtime's shell decodes, steps, commits and
+publishes. Time is passed in as ``now``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+from shift_schemas.messages import Fact, Seen
+
+S = TypeVar("S")
+
+
+@dataclass(frozen=True)
+class Step(Generic[S]):
+    """The next state, the facts that follow from the message, and a command's answer."""
+
+    state: S
+    facts: tuple[Fact, ...] = ()
+    result: dict[str, Any] = field(default_factory=dict)
+
+
+class NotYet(Exception):
+    """A command cannot be answered before its owner has read more of its inputs.
+
+    ``owners`` are those it waits for; after ``give_up_s`` the shell asks again with ``late=True``, and
+    the core then answers with what it has or raises what is the case.
+    """
+
+    def __init__(self, owners: tuple[str, ...], give_up_s: float) -> None:
+        super().__init__(f"waiting for {', '.join(owners)}")
+        self.owners = owners
+        self.give_up_s = give_up_s
+
+
+def covers(seen: Seen, need: Seen) -> bool:
+    """Whether what was ``seen`` is all that is ``need``-ed."""
+    return (
+        seen.decision >= need.decision
+        and seen.performance >= need.performance
+        and seen.config >= need.config
+        and seen.observation >= need.observation
+        and seen.policy >= need.policy
+        and all(seen.gaze.get(source, -1) >= seq for source, seq in need.gaze.items())
+    )
+
+
+def merged_seen(a: Seen, b: Seen) -> Seen:
+    """The larger of both, field by field."""
+    return Seen(
+        gaze={s: max(a.gaze.get(s, 0), b.gaze.get(s, 0)) for s in (*a.gaze, *b.gaze)},
+        decision=max(a.decision, b.decision),
+        performance=max(a.performance, b.performance),
+        config=max(a.config, b.config),
+        observation=max(a.observation, b.observation),
+        policy=max(a.policy, b.policy),
+    )
