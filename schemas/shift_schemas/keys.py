@@ -41,7 +41,15 @@ PROCEDURES: dict[str, tuple[str, ...]] = {
 }
 PROCEDURE_OWNER: dict[str, str] = {p: owner for owner, ps in PROCEDURES.items() for p in ps}
 STREAMS: dict[str, str] = {"gaze": "monitor"}
-SERVICES: tuple[str, ...] = ("recorder", "monitor", "decider", "learner", "gateway", "ros2_bridge", "simulator")
+SERVICES: tuple[str, ...] = (
+    "recorder",
+    "monitor",
+    "decider",
+    "learner",
+    "gateway",
+    "ros2_bridge",
+    "simulator",
+)
 DOORS: tuple[str, ...] = ("outbox", "health", "metrics", "alive")
 
 

@@ -419,8 +419,7 @@ class ReportPerformance(Command):
 
 
 COMMANDS: dict[str, type[Command]] = {
-    c.procedure: c
-    for c in (StartSession, EndSession, Configure, Mark, Decide, SetOverride, ReportPerformance)
+    c.procedure: c for c in (StartSession, EndSession, Configure, Mark, Decide, SetOverride, ReportPerformance)
 }
 
 

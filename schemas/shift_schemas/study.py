@@ -95,7 +95,8 @@ class FixationSettings(_Part):
     dispersion_deg: Positive = Field(default=2.0, description="x range + y range of a fixation, degrees; chosen.")
     minimum_duration_s: Positive = Field(default=0.06, description="A shorter one is none, s; chosen.")
     median_filter_s: NonNegative = Field(
-        default=0.03, description="Window of the median filter, s; without it a noisy trial is lost (measured)."
+        default=0.03,
+        description="Window of the median filter, s; without it a noisy trial is lost (measured).",
     )
     maximum_gap_s: Positive = Field(default=0.075, description="A longer loss ends a fixation, s; a blink's length.")
     screen_width_cm: Positive = Field(default=50.9, description="Stimulus width, cm: a 23 inch screen.")
@@ -356,10 +357,18 @@ class Study(_Part):
         return tuple(a.name for a in self.aois)
 
 
-CONDITIONAL: frozenset[str] = frozenset(Study.model_fields) - {"study", "title", "tasks", "aois", "conditions"}
+CONDITIONAL: frozenset[str] = frozenset(Study.model_fields) - {
+    "study",
+    "title",
+    "tasks",
+    "aois",
+    "conditions",
+}
 """What a condition can override."""
 
-CHANGEABLE: frozenset[str] = frozenset({"scoring", "capacity", "attention", "awareness", "reward", "decider", "learner"})
+CHANGEABLE: frozenset[str] = frozenset(
+    {"scoring", "capacity", "attention", "awareness", "reward", "decider", "learner"}
+)
 """What can change while a session runs; of scoring not the strategies' list and levels, of learner not the name."""
 
 
@@ -398,5 +407,3 @@ def _columns(table: dict[str, dict[str, dict[str, float]]], strategies: Any) -> 
         part: {category: {s: v for s, v in row.items() if s in strategies} for category, row in rows.items()}
         for part, rows in table.items()
     }
-
-

@@ -33,7 +33,9 @@ def parse_study(text: str, name: str = "study") -> Study:
     except (yaml.YAMLError, RecursionError) as e:
         mark = getattr(e, "problem_mark", None)
         where = f"{name}:{mark.line + 1}" if mark else name
-        raise InvalidStudy(f"{where}: this is not YAML: {getattr(e, 'problem', None) or 'it is nested too deep'}") from e
+        raise InvalidStudy(
+            f"{where}: this is not YAML: {getattr(e, 'problem', None) or 'it is nested too deep'}"
+        ) from e
     if not isinstance(node, yaml.MappingNode):
         raise InvalidStudy(f"{name}:1: a study is a mapping; begin with 'study: my-study'")
     lines: Lines = {}
@@ -107,7 +109,12 @@ def _validated(data: Any, name: str, lines: Lines, under: Path) -> Study:
 def _mistake(found: Any, lines: Lines, under: Path) -> tuple[int | None, FieldError]:
     path: Path = tuple(p for p in found["loc"] if p != "[key]")
     line = next(
-        (lines[p] for start in (under, ()) for n in range(len(path), -1, -1) if (p := (*start, *path[:n])) in lines and p),
+        (
+            lines[p]
+            for start in (under, ())
+            for n in range(len(path), -1, -1)
+            if (p := (*start, *path[:n])) in lines and p
+        ),
         lines.get((), None),
     )
     value = "" if found["type"] == "missing" else shorten(found["input"])

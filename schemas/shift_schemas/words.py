@@ -38,13 +38,9 @@ class Triple(NamedTuple):
     awareness: AwarenessClass
 
     @property
-    def index(self) -> int:
+    def number(self) -> int:
         """0..29: ``15 * capacity + 5 * gaze + awareness``."""
-        return (
-            15 * CAPACITIES.index(self.capacity)
-            + 5 * GAZES.index(self.gaze)
-            + AWARENESSES.index(self.awareness)
-        )
+        return 15 * CAPACITIES.index(self.capacity) + 5 * GAZES.index(self.gaze) + AWARENESSES.index(self.awareness)
 
     @property
     def name(self) -> str:

@@ -1,0 +1,18 @@
+"""The registry: a learner's name in the study file, and the learner. One file each."""
+
+from __future__ import annotations
+
+from shift_schemas.errors import InvalidStudy
+
+from shift_learner.learner import Learner
+from shift_learner.learners.q_learning import QLearning
+from shift_learner.learners.scoring import Scoring
+
+LEARNERS: dict[str, Learner] = {learner.name: learner for learner in (QLearning(), Scoring())}
+
+
+def learner_named(name: str) -> Learner:
+    """The learner of that name; :class:`InvalidStudy` names those that there are."""
+    if name not in LEARNERS:
+        raise InvalidStudy(f"learner.name: there is no learner {name!r} yet; write one of {', '.join(LEARNERS)}")
+    return LEARNERS[name]

@@ -1,0 +1,301 @@
+"""The decider's core: ``step(state, message, now) -> Step``. Pure.
+
+It folds observations, policies and configurations, puts out an estimate where scores or state change,
+and answers ``decide`` and ``override``. A decision needs an observation that has seen all decisions
+before it and what the door had answered, and the policy for its own number; where these do not come
+within ``wait_s`` it is made with what is there, and says so.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+from pydantic import TypeAdapter
+from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.messages import (
+    Command,
+    Config,
+    Decide,
+    Decision,
+    Estimate,
+    Fact,
+    Observation,
+    Override,
+    Policy,
+    Seen,
+    Session,
+    SessionState,
+    SetOverride,
+    Strategy,
+    Versions,
+)
+from shift_schemas.randomness import pick, uniform
+from shift_schemas.scoring import Reduction, reduce, view
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import NotYet, Step, covers, merged_seen
+from shift_schemas.study import Study
+from shift_schemas.study_text import study_of
+from shift_schemas.words import PolicySource, Triple
+
+ANY_TASK = ""
+"""The task of the estimate that stands for every task without results."""
+
+
+@dataclass(frozen=True)
+class DeciderState:
+    """All that the decider knows of one session."""
+
+    session: str
+    seed: int
+    phase: SessionState = "live"
+    config: Config | None = None
+    observation: Observation | None = None
+    policy: Policy | None = None
+    n: int = 0
+    overrides: dict[str, Override] = field(default_factory=dict)
+    estimates: dict[str, tuple[dict[str, float], str]] = field(default_factory=dict)
+
+
+_STATE = TypeAdapter(DeciderState)
+
+
+def dump(state: DeciderState) -> str:
+    """The state as JSON; :func:`load` takes it back exactly."""
+    return _STATE.dump_json(state).decode()
+
+
+def load(text: str) -> DeciderState:
+    """The state that :func:`dump` wrote."""
+    return _STATE.validate_json(text)
+
+
+@lru_cache(maxsize=64)
+def _parsed(study: str) -> Study:
+    return study_of(json.loads(study))
+
+
+def step(state: DeciderState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[DeciderState]:
+    """Fold one message of a session.
+
+    Raises
+    ------
+    NotYet
+        A decision must wait for the monitor, the learner or the recorder, and ``late`` is not set.
+    UnknownThing, Conflict, MalformedMessage, Unavailable
+        The command cannot be carried out.
+    """
+    if isinstance(message, Session):
+        if state is None:
+            return Step(DeciderState(message.session, message.seed, message.state))
+        return Step(replace(state, phase=message.state))
+    if state is None:
+        raise UnknownThing(f"there is no session {message.session}")
+    match message:
+        case Config():
+            return _estimated(replace(state, config=message), now)
+        case Observation():
+            return _estimated(replace(state, observation=message), now)
+        case Policy():
+            return Step(replace(state, policy=message))
+        case Decide():
+            return _decide(state, message, now, late)
+        case SetOverride():
+            return _override(state, message, now, late)
+    return Step(state)
+
+
+# --- estimates ---
+
+
+def _estimated(state: DeciderState, now: Stamp) -> Step[DeciderState]:
+    """Put out an estimate for each task whose scores or cognitive state changed."""
+    if state.config is None or state.observation is None:
+        return Step(state)
+    study = _parsed(state.config.study)
+    tasks = list(study.tasks) if study.tasks is not None else [ANY_TASK, *state.observation.awareness]
+    known = dict(state.estimates)
+    facts = []
+    for task in tasks:
+        triple = triple_of(state.observation, task)
+        found = reduce(study.scoring, triple)
+        if known.get(task) != (found.scores, found.cognitive_state):
+            known[task] = (found.scores, found.cognitive_state)
+            facts.append(
+                Estimate(
+                    session=state.session, stamp=now, seen=_seen(state), task=task, observation=view(triple),
+                    scores=found.scores, cognitive_state=found.cognitive_state,
+                    suggested=study.scoring.strategy(study.scoring.actions[found.action]),
+                )
+            )  # fmt: skip
+    return Step(replace(state, estimates=known), tuple(facts))
+
+
+def triple_of(observation: Observation, task: str) -> Triple:
+    """The monitoring state of a task: a task without results is unknown."""
+    results = observation.awareness.get(task)
+    return Triple(observation.capacity.category, observation.gaze.category, results.category if results else "unknown")
+
+
+def _seen(state: DeciderState) -> Seen:
+    observed = state.observation.seen if state.observation else Seen()
+    return Seen(
+        gaze=observed.gaze,
+        decision=state.n,
+        performance=observed.performance,
+        config=state.config.version if state.config else 0,
+        observation=state.observation.version if state.observation else 0,
+        policy=state.policy.version if state.policy else 0,
+    )
+
+
+# --- decisions ---
+
+
+class Lacks(NamedTuple):
+    """Whose news a decision would have to wait for."""
+
+    config: bool
+    observation: bool
+    policy: bool
+
+    @property
+    def owners(self) -> tuple[str, ...]:
+        """The services that own them."""
+        return tuple(o for o, lacking in zip(("recorder", "monitor", "learner"), self, strict=True) if lacking)
+
+
+def lacks(state: DeciderState, need: Seen) -> Lacks:
+    """What is not there yet for the next decision, given what the door had answered."""
+    version = state.config.version if state.config else 0
+    whole = merged_seen(need, Seen(decision=state.n, config=version))
+    of_policy = Seen(decision=state.n, performance=whole.performance, config=whole.config)
+    of_observation = whole.model_copy(update={"observation": 0, "policy": 0})
+    return Lacks(
+        config=version < max(1, need.config),
+        observation=state.observation is None or not covers(state.observation.seen, of_observation),
+        policy=state.policy is None or state.policy.for_n != state.n + 1 or not covers(state.policy.seen, of_policy),
+    )
+
+
+def _decide(state: DeciderState, command: Decide, now: Stamp, late: bool) -> Step[DeciderState]:
+    decision = decided(state, command.task, command.command_id, command.need, now, late)
+    overrides = {task: o for task, o in state.overrides.items() if task != command.task}
+    after = replace(state, n=decision.n, overrides=overrides)
+    return Step(after, (decision,), decision.model_dump(mode="json"))
+
+
+def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: Stamp, late: bool) -> Decision:
+    """The next decision for ``task``. The gateway's preview is this very function, on its replica."""
+    _check_live(state)
+    missing = lacks(state, need)
+    study = _study(state, missing, late)
+    if study.tasks is not None and task not in study.tasks:
+        raise UnknownThing(f"study {study.study} has no task {task!r}; it has {', '.join(study.tasks)}")
+    if missing.owners and not late:
+        raise NotYet(missing.owners, study.decider.wait_s)
+    if state.observation is None or state.config is None:
+        raise Unavailable("the monitor has put out no observation of this session yet")
+    triple = triple_of(state.observation, task)
+    found = reduce(study.scoring, triple)
+    choice = _choose(state, study, task, triple, found, missing)
+    strategies = [study.scoring.strategy(a) for a in study.scoring.actions]
+    override = state.overrides.get(task)
+    return Decision(
+        session=state.session, stamp=now, seen=_seen(state), decision_id=decision_id, task=task, n=state.n + 1,
+        strategy=strategies[choice.action], observation=view(triple), scores=found.scores,
+        cognitive_state=found.cognitive_state, suggested=strategies[found.action], actions=strategies,
+        probabilities=choice.probabilities, propensity=choice.propensity, explored=choice.explored,
+        policy_source=choice.source, stale=missing.observation, state=choice.state, seed=state.seed,
+        versions=Versions(
+            observation=state.observation.version,
+            policy=state.policy.version if state.policy else 0,
+            config=state.config.version,
+        ),
+        override_id=override.override_id if override else "", reason=override.reason if override else "",
+    )  # fmt: skip
+
+
+class Choice(NamedTuple):
+    """An action drawn, and why."""
+
+    action: int
+    probabilities: list[float]
+    propensity: float | None
+    explored: bool
+    source: PolicySource
+    state: str
+
+
+def _choose(state: DeciderState, study: Study, task: str, triple: Triple, found: Reduction, missing: Lacks) -> Choice:
+    actions = study.scoring.actions
+    policy = state.policy
+    if policy is None:
+        name, greedy = found.cognitive_state, found.action
+        row = [float(a == found.action) for a in range(len(actions))]
+    else:
+        name = found.cognitive_state if found.cognitive_state in policy.states else triple.name
+        row = policy.states[name].probabilities
+        values = policy.states[name].values
+        greedy = values.index(max(values))
+    if override := state.overrides.get(task):
+        action = actions.index(tuple(override.strategy[s] for s in study.scoring.strategies))
+        return Choice(action, row, None, False, "override", name)
+    action = pick(row, uniform(state.seed, state.n + 1))
+    source: PolicySource = "scoring" if policy is None else "last_policy" if missing.policy else "learner"
+    return Choice(action, row, row[action], action != greedy, source, name)
+
+
+# --- overrides ---
+
+
+def _override(state: DeciderState, command: SetOverride, now: Stamp, late: bool) -> Step[DeciderState]:
+    _check_live(state)
+    study = _study(state, lacks(state, command.need), late)
+    if study.tasks is not None and command.task not in study.tasks:
+        raise UnknownThing(f"study {study.study} has no task {command.task!r}; it has {', '.join(study.tasks)}")
+    check_strategy(study, command.strategy)
+    fact = Override(
+        session=state.session, stamp=now, seen=_seen(state), override_id=command.command_id, task=command.task,
+        strategy={s: command.strategy[s] for s in study.scoring.strategies}, reason=command.reason,
+    )  # fmt: skip
+    return Step(
+        replace(state, overrides={**state.overrides, command.task: fact}),
+        (fact,),
+        fact.model_dump(mode="json"),
+    )
+
+
+def check_strategy(study: Study, strategy: Strategy) -> None:
+    """Raise :class:`MalformedMessage` unless each strategy of the study is given one of its levels."""
+    errors = [
+        FieldError(
+            field=f"strategy.{name}",
+            value=shorten(strategy.get(name, "")),
+            rule=f"one of {', '.join(settings.levels)}",
+        )
+        for name, settings in study.scoring.strategies.items()
+        if strategy.get(name) not in settings.levels
+    ]
+    errors += [
+        FieldError(field=f"strategy.{shorten(name)}", value=shorten(strategy[name]), rule="no strategy of this study")
+        for name in strategy
+        if name not in study.scoring.strategies
+    ]
+    if errors:
+        raise MalformedMessage(f"{errors[0].field}: {errors[0].rule}", tuple(errors))
+
+
+def _check_live(state: DeciderState) -> None:
+    if state.phase != "live":
+        raise Conflict(f"session {state.session} has ended")
+
+
+def _study(state: DeciderState, missing: Lacks, late: bool) -> Study:
+    if missing.config and not late:
+        raise NotYet(("recorder",), _parsed(state.config.study).decider.wait_s if state.config else 2.0)
+    if state.config is None:
+        raise Unavailable("the recorder has put out no configuration of this session yet")
+    return _parsed(state.config.study)

@@ -1,0 +1,281 @@
+"""The learner's core: ``step(state, message, now) -> Step``. Pure.
+
+It folds decisions and configurations, answers ``report_performance`` and puts out a new policy after
+each of them: a policy holds for one decision number, since exploration, untaken actions and planning
+depend on both. A report gives a performance, a transition (what was learned from) and a policy. With
+a discount above 0 the transition waits for the next decision, or for the session's end.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+from pydantic import TypeAdapter
+from shift_schemas.errors import Conflict, Unavailable, UnknownThing
+from shift_schemas.messages import (
+    Command,
+    Config,
+    Decision,
+    Fact,
+    Performance,
+    Policy,
+    PolicyRow,
+    ReportPerformance,
+    Seen,
+    Session,
+    SessionState,
+    Transition,
+    Versions,
+)
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import NotYet, Step
+from shift_schemas.study_text import study_of
+from shift_schemas.words import Triple
+
+from shift_learner.learner import Context, Learner, Taken, state_names, state_of
+from shift_learner.learners import learner_named
+from shift_learner.reward import reward, task_performance
+
+WAIT_S = 2.0
+"""How long a report waits for its decision or configuration to come in; chosen, as the decider's."""
+
+
+@dataclass(frozen=True)
+class Open:
+    """A decision whose report has not come, or whose update has not been made."""
+
+    task: str
+    taken: Taken
+    versions: Versions
+
+
+@dataclass(frozen=True)
+class LearnerState:
+    """All that the learner knows of one session. ``memory`` is the learner's own, as plain JSON on disk."""
+
+    session: str
+    phase: SessionState = "live"
+    config: Config | None = None
+    memory: Any = None
+    open: dict[str, Open] = field(default_factory=dict)
+    rewards: dict[str, float] = field(default_factory=dict)
+    """Reported, and waiting for the decision that follows."""
+    last: Taken | None = None
+    decisions: int = 0
+    performances: int = 0
+    cumulative_reward: float = 0.0
+    version: int = 0
+
+
+_STATE = TypeAdapter(LearnerState)
+
+
+def dump(state: LearnerState) -> str:
+    """The state as JSON; :func:`load` takes it back exactly."""
+    plain = state if state.config is None else replace(state, memory=_learner(state).dump(state.memory))
+    return _STATE.dump_json(plain).decode()
+
+
+def load(text: str) -> LearnerState:
+    """The state that :func:`dump` wrote."""
+    state = _STATE.validate_json(text)
+    if state.config is None:
+        return state
+    return replace(state, memory=_learner(state).load(_context(state), state.memory))
+
+
+@lru_cache(maxsize=64)
+def context_of(study: str) -> Context:
+    """The context of a study in force, given as ``config`` facts carry it."""
+    return Context(study_of(json.loads(study)))
+
+
+def step(state: LearnerState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[LearnerState]:
+    """Fold one message of a session.
+
+    Raises
+    ------
+    NotYet
+        A report must wait for its decision or configuration, and ``late`` is not set.
+    UnknownThing, Conflict, Unavailable
+        The report cannot be taken.
+    """
+    if isinstance(message, Session):
+        if state is None:
+            return Step(LearnerState(message.session, message.state))
+        return _ended(replace(state, phase=message.state), now)
+    if state is None:
+        raise UnknownThing(f"there is no session {message.session}")
+    match message:
+        case Config():
+            return _configured(state, message, now)
+        case Decision():
+            return _decided(state, message, now)
+        case ReportPerformance():
+            return _reported(state, message, now, late)
+    return Step(state)
+
+
+# --- what each input does ---
+
+
+def _configured(state: LearnerState, config: Config, now: Stamp) -> Step[LearnerState]:
+    after = replace(state, config=config)
+    if state.config is None:
+        after = replace(after, memory=_learner(after).initial(_context(after)))
+    return _with_policy(after, (), now)
+
+
+def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[LearnerState]:
+    context, learner = _context(state), _learner(state)
+    triple = Triple(decision.observation.capacity, decision.observation.gaze, decision.observation.awareness)
+    taken = Taken(
+        n=decision.n,
+        triple=triple.number,
+        cognitive_state=context.cognitive_states.index(decision.cognitive_state),
+        action=decision.actions.index(decision.strategy),
+        propensity=decision.propensity,
+    )
+    previous = next((i for i, o in state.open.items() if i in state.rewards and o.taken == state.last), None)
+    after = replace(
+        state,
+        memory=learner.decided(context, state.memory, taken),
+        open={**state.open, decision.decision_id: Open(decision.task, taken, decision.versions)},
+        last=taken,
+        decisions=decision.n,
+    )
+    facts: tuple[Fact, ...] = ()
+    if previous is not None:
+        after, transition = _updated(after, previous, taken, now)
+        facts = (transition,)
+    return _with_policy(after, facts, now)
+
+
+def _reported(state: LearnerState, command: ReportPerformance, now: Stamp, late: bool) -> Step[LearnerState]:
+    if state.phase != "live":
+        raise Conflict(f"session {state.session} has ended")
+    _check_known(state, command, late)
+    if command.command_id in state.rewards:
+        raise Conflict(f"decision {command.command_id} has its performance already")
+    performance = _performance(state, command, now)
+    known = state.open[command.command_id]
+    after = replace(
+        state,
+        performances=performance.n,
+        cumulative_reward=performance.cumulative_reward,
+        rewards={**state.rewards, command.command_id: performance.reward},
+    )
+    facts: tuple[Fact, ...] = (performance,)
+    waits = _learner(state).needs_following(_context(state)) and known.taken == state.last
+    if not waits:
+        following = next((o.taken for o in state.open.values() if o.taken.n == known.taken.n + 1), state.last)
+        after, transition = _updated(after, command.command_id, following, now)
+        facts = (performance, transition)
+    done = _with_policy(after, facts, now)
+    return replace(done, result=performance.model_dump(mode="json"))
+
+
+def _ended(state: LearnerState, now: Stamp) -> Step[LearnerState]:
+    """What waited for a next decision that will not come is learned without one."""
+    if state.phase != "ending" or not state.rewards:
+        return Step(state)
+    facts: list[Fact] = []
+    for decision_id in list(state.rewards):
+        state, transition = _updated(state, decision_id, None, now)
+        facts.append(transition)
+    return _with_policy(state, tuple(facts), now)
+
+
+# --- pieces ---
+
+
+def _check_known(state: LearnerState, command: ReportPerformance, late: bool) -> None:
+    behind = tuple(
+        owner
+        for owner, lacking in (
+            ("recorder", state.config is None or state.config.version < command.need.config),
+            ("decider", command.command_id not in state.open or state.decisions < command.need.decision),
+        )
+        if lacking
+    )
+    if behind and not late:
+        raise NotYet(behind, WAIT_S)
+    if state.config is None or state.decisions < command.need.decision:
+        raise Unavailable(f"the learner has not heard all of the {' and the '.join(behind)} yet")
+    if command.command_id not in state.open:
+        raise UnknownThing(f"session {state.session} has no decision {command.command_id} that waits for a result")
+
+
+def _performance(state: LearnerState, command: ReportPerformance, now: Stamp) -> Performance:
+    settings = _context(state).study.reward
+    comprehension = task_performance(command.comprehension, settings)
+    enabledness = task_performance(command.enabledness, settings)
+    gained = reward(comprehension.value, enabledness.value, settings)
+    return Performance(
+        session=state.session, stamp=now, seen=_seen(state), decision_id=command.command_id,
+        task=state.open[command.command_id].task, n=state.performances + 1, comprehension=comprehension,
+        enabledness=enabledness, reward=gained, cumulative_reward=state.cumulative_reward + gained,
+    )  # fmt: skip
+
+
+def _updated(
+    state: LearnerState, decision_id: str, following: Taken | None, now: Stamp
+) -> tuple[LearnerState, Transition]:
+    """Learn from a reported decision. ``following`` may be the decision itself: then nothing follows."""
+    context, learner = _context(state), _learner(state)
+    known, gained = state.open[decision_id], state.rewards[decision_id]
+    if following is not None and following.n <= known.taken.n:
+        following = None
+    memory = learner.rewarded(context, state.memory, known.taken, gained, following)
+    row = state_of(learner, known.taken)
+    transition = Transition(
+        session=state.session, stamp=now, seen=_seen(state), decision_id=decision_id, task=known.task,
+        state=state_names(learner, context)[row],
+        action=context.study.scoring.strategy(context.study.scoring.actions[known.taken.action]),
+        reward=gained, propensity=known.taken.propensity, versions=known.versions,
+        value=learner.row(context, memory, row).values[known.taken.action],
+    )  # fmt: skip
+    after = replace(
+        state,
+        memory=memory,
+        open={i: o for i, o in state.open.items() if i != decision_id},
+        rewards={i: r for i, r in state.rewards.items() if i != decision_id},
+    )
+    return after, transition
+
+
+def _with_policy(state: LearnerState, facts: tuple[Fact, ...], now: Stamp) -> Step[LearnerState]:
+    after = replace(state, version=state.version + 1)
+    context, learner = _context(after), _learner(after)
+    rows = {}
+    for index, name in enumerate(state_names(learner, context)):
+        row = learner.row(context, after.memory, index)
+        rows[name] = PolicyRow(probabilities=row.probabilities, values=row.values, visits=row.visits)
+    policy = Policy(
+        session=after.session, stamp=now, seen=_seen(after), version=after.version,
+        learner=context.study.learner.name, for_n=after.decisions + 1,
+        actions=[context.study.scoring.strategy(a) for a in context.study.scoring.actions], states=rows,
+        epsilon=learner.epsilon(context, after.memory), cumulative_reward=after.cumulative_reward,
+    )  # fmt: skip
+    return Step(after, (*facts, policy))
+
+
+def _seen(state: LearnerState) -> Seen:
+    return Seen(
+        decision=state.decisions,
+        performance=state.performances,
+        config=state.config.version if state.config else 0,
+    )
+
+
+def _context(state: LearnerState) -> Context:
+    if state.config is None:
+        raise Unavailable("the recorder has put out no configuration of this session yet")
+    return context_of(state.config.study)
+
+
+def _learner(state: LearnerState) -> Learner:
+    return learner_named(_context(state).study.learner.name)

@@ -1,0 +1,99 @@
+"""The paper's learner: Q-learning with decayed epsilon-greedy that tries untaken actions first.
+
+Paper, section III-D (Watkins & Dayan 1992; Tokic 2010; Castro-Gonzalez et al. 2014). Target
+r + gamma x max Q(s'); Q0 = ``prior_value`` on the state's own action where the scoring system is the
+prior, else 0. Epsilon falls linearly to 0 over the planned interactions. An exploring step picks
+uniformly among the actions never taken in this run, and once there is none, among all. Greedy ties go
+to the first action. *Taken* means decided, overrides included; visits count reported decisions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from shift_learner.learner import Context, Row, Taken
+
+
+@dataclass(frozen=True)
+class Memory:
+    """The Q-table and what exploration depends on."""
+
+    values: tuple[tuple[float, ...], ...]
+    visits: tuple[tuple[int, ...], ...]
+    taken: tuple[bool, ...]
+    decisions: int = 0
+
+
+class QLearning:
+    """See the module."""
+
+    name = "q-learning"
+    on_triples = False
+
+    def initial(self, context: Context) -> Memory:
+        """Q0, nothing taken."""
+        settings = context.study.learner
+        prior = settings.prior_value if settings.scoring_prior else 0.0
+        n = context.actions
+        return Memory(
+            values=tuple(tuple(prior if action == state else 0.0 for action in range(n)) for state in range(n)),
+            visits=((0,) * n,) * n,
+            taken=(False,) * n,
+        )
+
+    def decided(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+        """The action is taken, and epsilon one decision further."""
+        return replace(
+            memory,
+            taken=tuple(t or action == taken.action for action, t in enumerate(memory.taken)),
+            decisions=memory.decisions + 1,
+        )
+
+    def rewarded(
+        self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
+    ) -> Memory:
+        """Q(s, a) moves by the learning rate towards r + gamma x max Q(s')."""
+        settings = context.study.learner
+        state, action = taken.cognitive_state, taken.action
+        row = list(memory.values[state])
+        target = reward
+        if following is not None:
+            target = reward + settings.discount * max(memory.values[following.cognitive_state])
+        row[action] = row[action] + settings.learning_rate * (target - row[action])
+        visits = list(memory.visits[state])
+        visits[action] += 1
+        return replace(
+            memory,
+            values=(*memory.values[:state], tuple(row), *memory.values[state + 1 :]),
+            visits=(*memory.visits[:state], tuple(visits), *memory.visits[state + 1 :]),
+        )
+
+    def needs_following(self, context: Context) -> bool:
+        """With a discount above 0."""
+        return context.study.learner.discount > 0
+
+    def row(self, context: Context, memory: Memory, state: int) -> Row:
+        """The exact distribution of the rule."""
+        values = memory.values[state]
+        epsilon = self.epsilon(context, memory)
+        candidates = [a for a, taken in enumerate(memory.taken) if not taken] or list(range(context.actions))
+        probabilities = [0.0] * context.actions
+        for action in candidates:
+            probabilities[action] = epsilon / len(candidates)
+        probabilities[values.index(max(values))] += 1.0 - epsilon
+        return Row(probabilities, list(values), list(memory.visits[state]))
+
+    def epsilon(self, context: Context, memory: Memory) -> float:
+        """Linear from ``epsilon`` to 0 over the planned interactions, by the decisions made before."""
+        study = context.study
+        return study.learner.epsilon * max(0.0, 1.0 - memory.decisions / study.interactions)
+
+    def dump(self, memory: Memory) -> Any:
+        """Plain lists."""
+        return [memory.values, memory.visits, memory.taken, memory.decisions]
+
+    def load(self, context: Context, data: Any) -> Memory:
+        """Tuples again."""
+        values, visits, taken, decisions = data
+        return Memory(tuple(map(tuple, values)), tuple(map(tuple, visits)), tuple(taken), decisions)
