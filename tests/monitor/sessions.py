@@ -1,0 +1,106 @@
+"""Sessions, studies and recordings for the monitor's tests: what several of them need."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from shift_cli.gaze_files import Sample, chunks, samples
+from shift_monitor.core import MonitorState, step
+from shift_schemas.messages import (
+    Config,
+    Decision,
+    Fact,
+    Fixation,
+    GazeChunk,
+    Message,
+    Observation,
+    Performance,
+    ScoredResult,
+    Session,
+    TripleView,
+    Versions,
+)
+from shift_schemas.stamps import Stamp
+from shift_schemas.study import Study
+from shift_schemas.study_text import study_json, study_of
+
+NOW = Stamp(sec=1_700_000_000, nsec=0)
+RECORDINGS = sorted((Path(__file__).parents[1] / "data" / "gaze").glob("*.tsv.gz"))
+AFFIRMATION = {"negation": "affirmation", "hesitation": "none"}
+NEGATION = {"negation": "negation", "hesitation": "none"}
+
+
+def study(**parts: Any) -> Study:
+    return study_of({"study": "test"} | parts)
+
+
+def session(state: str = "live") -> Session:
+    return Session(
+        session="s1", stamp=NOW, participant="P01", study="test", seed=7, state=state, started=NOW
+    )  # type: ignore[arg-type]
+
+
+def config(of: Study, version: int = 1) -> Config:
+    return Config(session="s1", stamp=NOW, version=version, study=study_json(of))
+
+
+def decision(n: int, strategy: dict[str, str] = AFFIRMATION) -> Decision:
+    return Decision(
+        session="s1", stamp=NOW, decision_id=f"d{n}", task="grasp", n=n, strategy=strategy,
+        observation=TripleView(capacity="high", gaze="uncertain", awareness="unknown"), scores={},
+        cognitive_state="engaged_observer", suggested=strategy, actions=[strategy], probabilities=[1.0],
+        propensity=1.0, explored=False, policy_source="scoring",
+        versions=Versions(observation=1, policy=0, config=1), stale=False, state="engaged_observer", seed=7,
+    )  # fmt: skip
+
+
+def performance(n: int, comprehension: bool, enabledness: bool, task: str = "grasp") -> Performance:
+    def scored(success: bool) -> ScoredResult:
+        return ScoredResult(success=success, duration_s=5.0, value=0.6 if success else -0.6)
+
+    return Performance(
+        session="s1", stamp=NOW, decision_id=f"d{n}", task=task, n=n, reward=0.0, cumulative_reward=0.0,
+        comprehension=scored(comprehension), enabledness=scored(enabledness),
+    )  # fmt: skip
+
+
+def points(seq: int, t: list[float], x: list[float | None], y: float = 0.5, source: str = "eyes") -> GazeChunk:
+    return GazeChunk(source=source, seq=seq, t=t, x=x, y=[None if v is None else y for v in x])
+
+
+def names(seq: int, t: list[float], aoi: list[str | None], source: str = "ros") -> GazeChunk:
+    return GazeChunk(source=source, seq=seq, t=t, aoi=aoi)
+
+
+def began(of: Study | None = None) -> MonitorState:
+    return fold(None, session(), config(of or study()))[0]
+
+
+def fold(state: MonitorState | None, *events: Message) -> tuple[MonitorState, list[Fact]]:
+    facts: list[Fact] = []
+    for event in events:
+        done = step(state, event, NOW)
+        state = done.state
+        facts += done.facts
+    assert state is not None
+    return state, facts
+
+
+def last(facts: list[Fact]) -> Observation:
+    found = facts[-1]
+    assert isinstance(found, Observation)
+    return found
+
+
+def fixations(facts: list[Fact]) -> list[Fixation]:
+    return [f for f in facts if isinstance(f, Fixation)]
+
+
+def recording(path: Path) -> list[Sample]:
+    return list(samples(path))
+
+
+def played(taken: list[Sample], n: int, of: Study | None = None) -> tuple[MonitorState, list[Fact]]:
+    """A session of these samples in chunks of ``n``, from its start to its end."""
+    return fold(began(of), *chunks(taken, n), session("ending"))
