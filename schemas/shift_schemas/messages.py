@@ -432,6 +432,7 @@ class OutboxQuery(Message):
     cursors: dict[Id, Count] = Field(default={}, description="Per session, the last sequence that was read.")
     limit: Annotated[int, Field(ge=1, le=10_000)] = 1000
     only: list[Id] | None = Field(default=None, description="Only these sessions; none: all.")
+    closed: bool = Field(default=False, description="Sessions that ended as well.")
 
 
 class OutboxRow(Message):
@@ -456,7 +457,9 @@ class OutboxPage(Message):
 class Answer(Message):
     """A command's or stream's reply: the acknowledgement."""
 
-    repeat: bool = False
+    owner: str = Field(description="The service that answered.")
+    seq: Count = Field(description="The owner's sequence in this session with the effects of it.")
+    repeat: bool = Field(default=False, description="It had been carried out before; this is the first result.")
     result: dict[str, Any]
 
 

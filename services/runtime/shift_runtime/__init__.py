@@ -1,0 +1,1 @@
+"""The shared shell: bus, journal, reader, worker, clock, settings, router and the mesh client."""

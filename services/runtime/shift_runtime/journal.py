@@ -1,0 +1,189 @@
+"""The journal: one SQLite file in which a service commits everything at once.
+
+State, how far the inputs were read, outgoing facts (numbered 1, 2, 3 ... per session) and the answers
+of commands go in one transaction, before anything is published or replied. So a service can die at any
+moment: what was acknowledged is here, and what is here is applied once.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from shift_schemas.errors import InvalidSettings, Unavailable
+from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
+
+_TABLES = """
+CREATE TABLE IF NOT EXISTS outbox (
+    session TEXT, seq INTEGER, subject TEXT, payload TEXT, PRIMARY KEY (session, seq)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS cursor (
+    session TEXT, owner TEXT, seq INTEGER, PRIMARY KEY (session, owner)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS state (session TEXT PRIMARY KEY, data TEXT, closed INTEGER DEFAULT 0) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS answer (
+    session TEXT, procedure TEXT, command_id TEXT, digest TEXT, result TEXT,
+    PRIMARY KEY (session, procedure, command_id)) WITHOUT ROWID;
+"""
+
+AnswerKey = tuple[str, str, str]
+"""Session, procedure, command id."""
+
+
+@dataclass(frozen=True)
+class StoredAnswer:
+    """The first result of a command, and a digest of what was asked."""
+
+    digest: str
+    result: dict[str, Any]
+
+
+@dataclass
+class Batch:
+    """What one commit holds."""
+
+    states: dict[str, str] = field(default_factory=dict)
+    cursors: dict[tuple[str, str], int] = field(default_factory=dict)
+    rows: list[OutboxRow] = field(default_factory=list)
+    answers: dict[AnswerKey, StoredAnswer] = field(default_factory=dict)
+    closed: set[str] = field(default_factory=set)
+
+    def __bool__(self) -> bool:
+        return bool(self.states or self.cursors or self.rows or self.answers or self.closed)
+
+
+def digest_of(content: str) -> str:
+    """A short fingerprint of a command's content."""
+    return hashlib.sha256(content.encode()).hexdigest()[:32]
+
+
+class Journal:
+    """One service's journal. Not for several threads."""
+
+    def __init__(self, path: Path, owner: str) -> None:
+        """Open or make the file.
+
+        Raises
+        ------
+        InvalidSettings
+            The folder cannot be written.
+        """
+        self.owner = owner
+        self.path = path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(path, isolation_level=None, timeout=5.0)
+            self._db.execute("PRAGMA journal_mode=WAL")
+            self._db.execute("PRAGMA synchronous=FULL")
+            self._db.executescript(_TABLES)
+        except (sqlite3.Error, OSError) as e:
+            raise InvalidSettings(f"the journal {path} cannot be opened: {e}; set SHIFT_DATA to a folder for it") from e
+        self.heads: dict[str, int] = dict(self._db.execute("SELECT session, MAX(seq) FROM outbox GROUP BY session"))
+        self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
+
+    # --- reading back ---
+
+    def state(self, session: str) -> str | None:
+        """The last committed state of a session."""
+        row = self._db.execute("SELECT data FROM state WHERE session = ?", (session,)).fetchone()
+        return row[0] if row and row[0] is not None else None
+
+    def sessions(self) -> Iterator[tuple[str, bool]]:
+        """Every session with a state, and whether it is closed."""
+        yield from ((s, bool(c)) for s, c in self._db.execute("SELECT session, closed FROM state").fetchall())
+
+    def cursors(self) -> dict[tuple[str, str], int]:
+        """How far each owner's facts have been read, per (session, owner), of the sessions that are open."""
+        rows = self._db.execute("SELECT session, owner, seq FROM cursor").fetchall()
+        return {(s, o): n for s, o, n in rows if s not in self._closed}
+
+    def answer(self, key: AnswerKey) -> StoredAnswer | None:
+        """The first result of a command, if it was carried out."""
+        row = self._db.execute(
+            "SELECT digest, result FROM answer WHERE session = ? AND procedure = ? AND command_id = ?", key
+        ).fetchone()
+        return StoredAnswer(row[0], json.loads(row[1])) if row else None
+
+    def closed(self, session: str) -> bool:
+        """Whether the session has ended and its recording is finished."""
+        return session in self._closed
+
+    # --- writing ---
+
+    def commit(self, batch: Batch) -> None:
+        """Commit all of it or nothing.
+
+        Raises
+        ------
+        Unavailable
+            The disk is full or broken; nothing of the batch happened.
+        """
+        try:
+            self._db.execute("BEGIN IMMEDIATE")
+            self._write(batch)
+            self._db.execute("COMMIT")
+        except sqlite3.Error as e:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise Unavailable(f"the {self.owner} cannot write its journal {self.path.name}: {e}") from e
+        for row in batch.rows:
+            self.heads[row.session] = row.seq
+        self._closed |= batch.closed
+
+    def _write(self, batch: Batch) -> None:
+        db = self._db
+        db.executemany(
+            "INSERT INTO state (session, data) VALUES (?, ?) ON CONFLICT DO UPDATE SET data = excluded.data",
+            batch.states.items(),
+        )
+        db.executemany(
+            "INSERT OR REPLACE INTO cursor VALUES (?, ?, ?)", [(s, o, n) for (s, o), n in batch.cursors.items()]
+        )
+        db.executemany(
+            "INSERT INTO outbox VALUES (?, ?, ?, ?)", [(r.session, r.seq, r.subject, r.payload) for r in batch.rows]
+        )
+        db.executemany(
+            "INSERT INTO answer VALUES (?, ?, ?, ?, ?)",
+            [(*key, a.digest, json.dumps(a.result)) for key, a in batch.answers.items()],
+        )
+        db.executemany("UPDATE state SET closed = 1 WHERE session = ?", [(s,) for s in batch.closed])
+
+    # --- the outbox ---
+
+    def page(self, query: OutboxQuery, cursors: dict[tuple[str, str], int]) -> OutboxPage:
+        """What a reader has not seen, oldest first per session, at most ``query.limit`` rows.
+
+        Sessions that ended are told of only when they are asked for by name, or with ``closed``.
+        """
+        rows: list[OutboxRow] = []
+        sessions = self._asked(query)
+        for session in sessions:
+            after = query.cursors.get(session, 0)
+            if self.heads.get(session, 0) <= after:
+                continue
+            found = self._db.execute(
+                "SELECT seq, subject, payload FROM outbox WHERE session = ? AND seq > ? ORDER BY seq LIMIT ?",
+                (session, after, query.limit - len(rows)),
+            )
+            rows += [OutboxRow(session=session, seq=n, subject=s, payload=p) for n, s, p in found]
+            if len(rows) >= query.limit:
+                break
+        return OutboxPage(
+            owner=self.owner,
+            rows=rows,
+            heads={s: self.heads.get(s, 0) for s in sessions},
+            cursors={s: {o: n for (of, o), n in cursors.items() if of == s} for s in query.only or ()},
+            complete=len(rows) < query.limit,
+        )
+
+    def _asked(self, query: OutboxQuery) -> list[str]:
+        if query.only is not None:
+            return list(query.only)
+        return [s for s in self.heads if query.closed or s not in self._closed or query.cursors.get(s)]
+
+    def close(self) -> None:
+        """Close the file."""
+        self._db.close()

@@ -1,0 +1,137 @@
+"""The in-memory bus: the same handlers, no network. For tests of a whole mesh in one process."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from shift_runtime.bus import Handle, Incoming, Reply, Request
+
+T = TypeVar("T")
+
+
+def matches(expression: str, key: str) -> bool:
+    """Whether a key expression (``*`` is any one part) takes in ``key``."""
+    parts, wanted = key.split("/"), expression.split("/")
+    return len(parts) == len(wanted) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=True))
+
+
+@dataclass
+class Hub:
+    """Where the in-memory buses of one process meet."""
+
+    subscribers: list[tuple[str, Callable[[Incoming], None]]] = field(default_factory=list)
+    servers: list[tuple[str, Callable[[Request], None]]] = field(default_factory=list)
+    tokens: set[str] = field(default_factory=set)
+
+
+@dataclass
+class _Request:
+    key: str
+    payload: bytes
+    answered: asyncio.Future[Reply]
+
+    def reply(self, payload: bytes) -> None:
+        self._settle(Reply(True, payload))
+
+    def refuse(self, payload: bytes) -> None:
+        self._settle(Reply(False, payload))
+
+    def _settle(self, reply: Reply) -> None:
+        if not self.answered.done():
+            self.answered.set_result(reply)
+
+
+@dataclass
+class _Handle:
+    take_back: Callable[[], None]
+
+    def close(self) -> None:
+        self.take_back()
+
+
+class MemoryBus:
+    """One participant at a :class:`Hub`."""
+
+    def __init__(self, hub: Hub) -> None:
+        self._hub = hub
+        self._handles: list[_Handle] = []
+        self._waiting = 0
+        self._dropped = 0
+
+    def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        for expression, handler in list(self._hub.subscribers):
+            if matches(expression, key):
+                handler(Incoming(key, payload, attachment))
+
+    async def get(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[Reply]:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        waiting = []
+        for expression, handler in list(self._hub.servers):
+            if matches(expression, key):
+                future: asyncio.Future[Reply] = asyncio.get_running_loop().create_future()
+                handler(_Request(key, payload, future))
+                waiting.append(future)
+        if not waiting:
+            return []
+        done, _ = await asyncio.wait(waiting, timeout=timeout_s)
+        return [f.result() for f in done]
+
+    def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        entry = (key, self._later(handler, limit))
+        self._hub.subscribers.append(entry)
+        return self._held(lambda: self._hub.subscribers.remove(entry))
+
+    def serve(self, key: str, handler: Callable[[Request], None], *, limit: int = 10_000) -> Handle:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        entry = (key, self._later(handler, limit))
+        self._hub.servers.append(entry)
+        return self._held(lambda: self._hub.servers.remove(entry))
+
+    def token(self, key: str) -> Handle:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        self._hub.tokens.add(key)
+        return self._held(lambda: self._hub.tokens.discard(key))
+
+    @property
+    def dropped(self) -> int:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        return self._dropped
+
+    async def close(self) -> None:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        while self._handles:
+            self._handles[-1].close()
+
+    def _held(self, take_back: Callable[[], None]) -> Handle:
+        handle = _Handle(lambda: None)
+
+        def close() -> None:
+            if handle in self._handles:
+                self._handles.remove(handle)
+                take_back()
+
+        handle.take_back = close
+        self._handles.append(handle)
+        return handle
+
+    def _later(self, handler: Callable[[T], None], limit: int) -> Callable[[T], None]:
+        """The handler, to be run by the loop in its own time, as from a network."""
+        loop = asyncio.get_running_loop()
+
+        def run(item: T) -> None:
+            self._waiting -= 1
+            handler(item)
+
+        def enqueue(item: T) -> None:
+            if self._waiting >= limit:
+                self._dropped += 1
+                return
+            self._waiting += 1
+            loop.call_soon(run, item)
+
+        return enqueue

@@ -1,0 +1,58 @@
+"""Metrics of one process, in a registry of its own; the gateway gathers them all under ``/metrics``."""
+
+from __future__ import annotations
+
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+
+
+class Metrics:
+    """The counters that every service keeps; label ``service`` on each."""
+
+    def __init__(self, service: str) -> None:
+        self.service = service
+        self.registry = CollectorRegistry()
+        self._dropped = self._counter("shift_messages_dropped", "Messages dropped, by reason.", ("reason",))
+        self._facts = self._counter("shift_facts_published", "Facts committed and published.", ("subject",))
+        self._commands = self._counter("shift_commands", "Commands answered.", ("procedure", "outcome"))
+        self._read = self._counter("shift_facts_read", "Facts of other services taken in.", ("subject",))
+        self._failed = self._counter("shift_commits_failed", "Commits that the disk refused.", ())
+        self._sessions = Gauge("shift_sessions", "Sessions in memory.", ("service",), registry=self.registry).labels(
+            service
+        )
+        self.commit_seconds = Histogram(
+            "shift_commit_seconds", "Duration of a commit.", ("service",), registry=self.registry,
+            buckets=(0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0),
+        ).labels(service)  # fmt: skip
+        for reason in ("malformed", "refused", "overload"):
+            self._dropped.labels(service, reason)
+
+    def _counter(self, name: str, text: str, labels: tuple[str, ...]) -> Counter:
+        return Counter(name, text, ("service", *labels), registry=self.registry)
+
+    def dropped(self, reason: str, count: int = 1) -> None:
+        """A message was dropped."""
+        self._dropped.labels(self.service, reason).inc(count)
+
+    def published(self, subject: str) -> None:
+        """A fact was committed and published."""
+        self._facts.labels(self.service, subject).inc()
+
+    def read(self, subject: str) -> None:
+        """A fact of another service was taken in."""
+        self._read.labels(self.service, subject).inc()
+
+    def answered(self, procedure: str, outcome: str) -> None:
+        """A command was answered."""
+        self._commands.labels(self.service, procedure, outcome).inc()
+
+    def commit_failed(self) -> None:
+        """The disk refused a commit."""
+        self._failed.labels(self.service).inc()
+
+    def sessions(self, count: int) -> None:
+        """How many sessions are in memory."""
+        self._sessions.set(count)
+
+    def text(self) -> bytes:
+        """The exposition text."""
+        return generate_latest(self.registry)

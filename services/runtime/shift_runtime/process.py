@@ -1,0 +1,52 @@
+"""Running a service as a process: settings, logs, bus, journal, signals; one line in ``__main__``."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import structlog
+from shift_schemas.errors import ShiftError
+
+from shift_runtime.clock import SystemClock
+from shift_runtime.journal import Journal
+from shift_runtime.logs import configure_logs
+from shift_runtime.metrics import Metrics
+from shift_runtime.settings import MeshSettings, read_settings
+from shift_runtime.worker import Core, Worker
+from shift_runtime.zenoh_bus import ZenohBus
+
+log = structlog.get_logger()
+WorkerKind = Callable[..., Worker[Any]]
+
+
+def run_service(core: Core[Any], kind: WorkerKind = Worker) -> None:
+    """Run a service until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that do not do."""
+    try:
+        settings = read_settings()
+        configure_logs(core.name, settings)
+        asyncio.run(serve(core, settings, kind))
+    except ShiftError as e:
+        sys.stderr.write(f"shift_{core.name}: {e.detail}\n")
+        sys.exit(2)
+
+
+async def serve(core: Core[Any], settings: MeshSettings, kind: WorkerKind = Worker) -> None:
+    """The service on its bus, until a signal."""
+    journal = Journal(settings.data / "state" / f"{core.name}.sqlite", core.name)
+    bus = await ZenohBus.open(settings.zenoh, settings.listen)
+    extra = {} if kind is Worker else {"settings": settings}
+    worker = kind(core, bus, journal, SystemClock(), Metrics(core.name), **extra)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, worker.stop)
+    log.info("started", router=settings.zenoh, data=str(settings.data))
+    try:
+        await worker.run()
+    finally:
+        await bus.close()
+        journal.close()
+        log.info("stopped")

@@ -1,0 +1,179 @@
+"""The reader: one way to read another service's facts, for every service, door and recorder.
+
+The live publication is a hint. A reader takes exactly cursor + 1 of each owner and session, and pulls
+what it misses from the owner's outbox: at the start, at once on a gap, every half second, and when it
+is asked to. So nothing is missed and nothing is read twice, whatever the network does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from shift_schemas.codec import decode, encode
+from shift_schemas.errors import MalformedMessage
+from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, build_key, parse_key
+from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxRow
+
+from shift_runtime.bus import Bus, Incoming
+
+PULL_EVERY_S = 0.5
+PULL_TIMEOUT_S = 1.0
+
+
+@dataclass(frozen=True)
+class ReadFact:
+    """A fact in its turn."""
+
+    owner: str
+    seq: int
+    fact: Fact
+    payload: str
+
+
+def fact_of(row: OutboxRow) -> Fact:
+    """The fact of an outbox row. Raises :class:`MalformedMessage`."""
+    kind = FACTS.get(row.subject)
+    if kind is None:
+        raise MalformedMessage(f"{row.subject!r} is no subject")
+    fact = decode(kind, row.payload)
+    if fact.session != row.session:
+        raise MalformedMessage(f"a {row.subject} of session {fact.session} under session {row.session}")
+    return fact
+
+
+@dataclass
+class Reader:
+    """Reads ``owners`` through ``bus`` and hands each fact, in its owner's order, to ``deliver``.
+
+    ``cursors`` is (session, owner) -> last sequence delivered; it starts where the caller had read to.
+    ``dropped`` is told the reason of each publication that was no fact.
+    """
+
+    bus: Bus
+    owners: tuple[str, ...]
+    cursors: dict[tuple[str, str], int]
+    deliver: Callable[[ReadFact], None]
+    dropped: Callable[[str], None]
+    closed: bool = False
+    """Whether sessions that ended are read as well."""
+    done: set[str] = field(default_factory=set)
+    """Sessions of which nothing more is read."""
+    synced: set[str] = field(default_factory=set)
+    """Owners whose outbox was read to its end at least once."""
+    pages: dict[str, OutboxPage] = field(default_factory=dict)
+    _pulls: dict[tuple[str, str | None], asyncio.Task[bool]] = field(default_factory=dict)
+    _again: set[tuple[str, str | None]] = field(default_factory=set)
+
+    def start(self) -> None:
+        """Listen to the hints."""
+        for owner in self.owners:
+            for subject in OWNERS[owner]:
+                self.bus.subscribe(f"{ROOT}/*/{subject}", self._hint)
+
+    async def run(self) -> None:
+        """Pull every owner for ever."""
+        while True:
+            await asyncio.gather(*(self.pull(owner) for owner in self.owners))
+            await asyncio.sleep(PULL_EVERY_S)
+
+    def forget(self, session: str) -> None:
+        """Read nothing more of a session that has ended."""
+        self.done.add(session)
+        for owner in self.owners:
+            self.cursors.pop((session, owner), None)
+
+    def _hint(self, incoming: Incoming) -> None:
+        try:
+            key = parse_key(incoming.key)
+            if not isinstance(key, FactKey):
+                raise MalformedMessage(f"{incoming.key} is no fact's key")
+            if not incoming.attachment.isdigit() or len(incoming.attachment) > 15:
+                raise MalformedMessage(f"a {key.subject} without a sequence")
+            row = OutboxRow(
+                session=key.session,
+                seq=int(incoming.attachment),
+                subject=key.subject,
+                payload=incoming.payload.decode(),
+            )
+            fact = fact_of(row)
+        except (MalformedMessage, UnicodeDecodeError, ValueError):
+            self.dropped("malformed")
+            return
+        owner = OWNER_OF[key.subject]
+        if owner not in self.owners or row.session in self.done:
+            return
+        if row.seq > self.cursors.get((row.session, owner), 0) + 1:
+            self.pull_soon(owner)
+            return
+        self._take(owner, row, fact)
+
+    def _take(self, owner: str, row: OutboxRow, fact: Fact | None = None) -> None:
+        if row.session in self.done or row.seq != self.cursors.get((row.session, owner), 0) + 1:
+            return
+        read = ReadFact(owner, row.seq, fact if fact is not None else fact_of(row), row.payload)
+        self.cursors[row.session, owner] = row.seq
+        self.deliver(read)
+
+    def pull_soon(self, owner: str, session: str | None = None) -> asyncio.Task[bool]:
+        """Pull in the background; what is asked for while a pull is under way gets one more after it."""
+        key = (owner, session)
+        running = self._pulls.get(key)
+        if running is not None and not running.done():
+            self._again.add(key)
+            return running
+        task = asyncio.get_running_loop().create_task(self._pull_until_current(key))
+        self._pulls[key] = task
+        return task
+
+    async def pull(self, owner: str, session: str | None = None) -> bool:
+        """Read the owner's outbox to its end; whether it answered."""
+        return await asyncio.shield(self.pull_soon(owner, session))
+
+    async def pull_all(self, owners: Iterable[str], session: str | None = None) -> tuple[str, ...]:
+        """Pull several; those that did not answer."""
+        wanted = [o for o in owners if o in self.owners]
+        answered = await asyncio.gather(*(self.pull(o, session) for o in wanted))
+        return tuple(o for o, ok in zip(wanted, answered, strict=True) if not ok)
+
+    async def _pull_until_current(self, key: tuple[str, str | None]) -> bool:
+        while True:
+            self._again.discard(key)
+            answered = await self._pull(*key)
+            if key not in self._again or not answered:
+                return answered
+
+    async def _pull(self, owner: str, session: str | None) -> bool:
+        while True:
+            query = OutboxQuery(
+                cursors={s: n for (s, o), n in self.cursors.items() if o == owner and session in (None, s)},
+                only=None if session is None else [session],
+                closed=self.closed and owner == "recorder",
+            )
+            page = await self._page(owner, query)
+            if page is None:
+                return False
+            try:
+                for row in page.rows:
+                    self._take(owner, row)
+            except MalformedMessage:
+                self.dropped("malformed")
+                return False
+            if session is not None:
+                self.pages[f"{owner}/{session}"] = page
+            if page.complete:
+                if session is None:
+                    self.synced.add(owner)
+                return True
+
+    async def _page(self, owner: str, query: OutboxQuery) -> OutboxPage | None:
+        key = build_key(ServiceKey(owner, "outbox"))
+        for reply in await self.bus.get(key, encode(query), timeout_s=PULL_TIMEOUT_S):
+            if not reply.ok:
+                continue
+            try:
+                return decode(OutboxPage, reply.payload)
+            except MalformedMessage:
+                self.dropped("malformed")
+        return None

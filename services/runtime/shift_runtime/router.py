@@ -1,0 +1,36 @@
+"""The router: where the processes of the mesh meet. A Zenoh session in router mode is the Rust router.
+
+``python -m shift_runtime.router`` listens on ``SHIFT_ROUTER_LISTEN`` until it is told to stop.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+
+import zenoh
+
+from shift_runtime.settings import DEFAULT_ROUTER
+from shift_runtime.zenoh_bus import zenoh_config
+
+
+def main() -> None:
+    """Open the router and wait for SIGINT or SIGTERM."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    listen = os.environ.get("SHIFT_ROUTER_LISTEN", DEFAULT_ROUTER)
+    try:
+        session = zenoh.open(zenoh_config("router", listen=listen))
+    except zenoh.ZError as e:
+        sys.exit(f"the router cannot listen on {listen}: {e}; is another one running? set SHIFT_ROUTER_LISTEN")
+    print(f"router listens on {listen}", file=sys.stderr, flush=True)
+    while not stop.wait(0.5):
+        pass
+    session.close()  # type: ignore[no-untyped-call]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,485 @@
+"""The worker: the shell that runs one service's core over bus and journal.
+
+One loop takes whatever has arrived (facts of other services in their order, commands, the gaze
+stream), steps the core, commits everything in one transaction and only then publishes and replies.
+It knows nothing of what the core does.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TypeVar
+
+import structlog
+from shift_schemas.codec import decode, encode, encoding_of
+from shift_schemas.errors import Conflict, MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
+from shift_schemas.keys import (
+    PROCEDURES,
+    ROOT,
+    STREAMS,
+    CommandKey,
+    FactKey,
+    ServiceKey,
+    StreamKey,
+    build_key,
+    parse_key,
+)
+from shift_schemas.messages import (
+    COMMANDS,
+    FACTS,
+    Answer,
+    Command,
+    Fact,
+    GazeChunk,
+    Health,
+    OutboxQuery,
+    OutboxRow,
+    Session,
+)
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import NotYet, Step
+
+from shift_runtime.bus import Bus, Incoming, Request
+from shift_runtime.clock import Clock
+from shift_runtime.journal import AnswerKey, Batch, Journal, StoredAnswer, digest_of
+from shift_runtime.metrics import Metrics
+from shift_runtime.reader import Reader, ReadFact
+
+S = TypeVar("S")
+log = structlog.get_logger()
+
+BATCH = 256
+HINT_WAIT_S = 0.05
+"""How long a waiting command trusts that a hint will come before its owner's outbox is pulled."""
+STREAM_LIMIT = 5_000
+"""Chunks that may wait; more are dropped and counted."""
+
+
+class CoreStep(Protocol[S]):
+    """A core's fold."""
+
+    def __call__(self, state: S | None, message: Any, now: Stamp, late: bool = False) -> Step[S]: ...
+
+
+@dataclass(frozen=True)
+class Core(Generic[S]):
+    """A core, and what it takes in: the owners that it reads and which of their subjects it steps on."""
+
+    name: str
+    step: CoreStep[S]
+    dump: Callable[[S], str]
+    load: Callable[[str], S]
+    reads: Mapping[str, frozenset[str]]
+
+
+@dataclass
+class Asked:
+    """A command or a chunk that waits for its answer. Repeats of it that arrive meanwhile wait along."""
+
+    session: str
+    procedure: str
+    message: Command | GazeChunk
+    requests: list[Request]
+    deadline: float | None = None
+    late: bool = False
+    checked: bool = False
+    """Whether the owners were asked again before something is called unknown."""
+
+    @property
+    def key(self) -> AnswerKey | None:
+        """Under which its answer is kept; the stream's chunks have their own numbers."""
+        if isinstance(self.message, Command):
+            return (self.session, self.procedure, self.message.command_id)
+        return None
+
+    def refuse(self, error: ShiftError) -> None:
+        """Answer all who wait with an error."""
+        payload = encode(Problem.of(error))
+        for request in self.requests:
+            request.refuse(payload)
+        self.requests.clear()
+
+
+@dataclass
+class _Turn:
+    """What one turn of the loop did, until it is committed."""
+
+    batch: Batch = field(default_factory=Batch)
+    before: dict[str, Any] = field(default_factory=dict)
+    facts: list[tuple[OutboxRow, Fact]] = field(default_factory=list)
+    answers: list[tuple[Asked, Answer]] = field(default_factory=list)
+    refusals: list[tuple[Asked, ShiftError]] = field(default_factory=list)
+    ended: set[str] = field(default_factory=set)
+
+
+class Worker(Generic[S]):
+    """Runs ``core``. :meth:`run` returns when :meth:`stop` was called."""
+
+    def __init__(self, core: Core[S], bus: Bus, journal: Journal, clock: Clock, metrics: Metrics) -> None:
+        self.core = core
+        self.bus = bus
+        self.journal = journal
+        self.clock = clock
+        self.metrics = metrics
+        self.states: dict[str, S | None] = {}
+        self.reader = Reader(
+            bus, tuple(core.reads), journal.cursors(), self._deliver, metrics.dropped, done=self._closed_sessions()
+        )
+        self.processed = dict(self.reader.cursors)
+        self._queue: deque[ReadFact | Asked | Callable[[], None]] = deque()
+        self._waiting: dict[str, list[Asked]] = {}
+        self._wake = asyncio.Event()
+        self._stopping = False
+        self._alarm = ""
+        self._overload = 0
+
+    # --- life ---
+
+    async def run(self) -> None:
+        """Declare the doors, read the journals, and work until :meth:`stop`."""
+        self._declare()
+        self.reader.start()
+        pulling = asyncio.create_task(self.reader.run())
+        try:
+            await self.on_start()
+            while not self._stopping:
+                await self._turn()
+            await self.on_stop()
+        finally:
+            pulling.cancel()
+
+    def stop(self) -> None:
+        """Finish the turn and return from :meth:`run`."""
+        self._stopping = True
+        self._wake.set()
+
+    async def on_start(self) -> None:
+        """A place for a service's own preparations."""
+
+    async def on_stop(self) -> None:
+        """A place for a service's own tidying."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether every owner's journal was read and the disk takes commits."""
+        return not self._alarm and self.reader.synced >= set(self.core.reads)
+
+    def _closed_sessions(self) -> set[str]:
+        return {s for s, closed in self.journal.sessions() if closed}
+
+    def _declare(self) -> None:
+        name = self.core.name
+        self.bus.serve(build_key(ServiceKey(name, "outbox")), self._on_outbox)
+        self.bus.serve(build_key(ServiceKey(name, "health")), self._on_health)
+        self.bus.serve(build_key(ServiceKey(name, "metrics")), self._on_metrics)
+        for procedure in PROCEDURES.get(name, ()):
+            self.bus.serve(f"{ROOT}/*/rpc/{procedure}", self._on_command)
+        for stream, owner in STREAMS.items():
+            if owner == name:
+                self.bus.serve(f"{ROOT}/*/in/{stream}", self._on_stream_request, limit=STREAM_LIMIT)
+                self.bus.subscribe(f"{ROOT}/*/in/{stream}", self._on_stream, limit=STREAM_LIMIT)
+        self.bus.token(build_key(ServiceKey(name, "alive")))
+
+    # --- arrivals; all in the loop ---
+
+    def enqueue(self, item: ReadFact | Asked | Callable[[], None]) -> None:
+        """Put something before the worker."""
+        self._queue.append(item)
+        self._wake.set()
+
+    def _deliver(self, read: ReadFact) -> None:
+        self.enqueue(read)
+
+    def _on_outbox(self, request: Request) -> None:
+        try:
+            query = decode(OutboxQuery, request.payload)
+        except MalformedMessage as e:
+            self._drop(request, e)
+            return
+        request.reply(encode(self.journal.page(query, self.processed)))
+
+    def _on_health(self, request: Request) -> None:
+        self.enqueue(lambda: request.reply(encode(self.health())))
+
+    def _on_metrics(self, request: Request) -> None:
+        dropped = self.bus.dropped
+        self.metrics.dropped("overload", dropped - self._overload)
+        self._overload = dropped
+        self.metrics.sessions(len(self.states))
+        request.reply(self.metrics.text())
+
+    def health(self) -> Health:
+        """This worker's own answer."""
+        missing = sorted(set(self.core.reads) - self.reader.synced)
+        detail = self._alarm or (f"waits for the {', the '.join(missing)}" if missing else "")
+        return Health(service=self.core.name, ready=self.ready, detail=detail, sessions=len(self.states))
+
+    def _on_command(self, request: Request) -> None:
+        try:
+            key = parse_key(request.key)
+            if not isinstance(key, CommandKey):
+                raise MalformedMessage(f"{request.key} is no command's key")
+            command = decode(COMMANDS[key.procedure], request.payload)
+            if command.session != key.session:
+                raise MalformedMessage(f"a command for session {command.session} under session {key.session}")
+        except MalformedMessage as e:
+            self._drop(request, e)
+            return
+        self._ask(key.session, key.procedure, command, [request])
+
+    def _on_stream_request(self, request: Request) -> None:
+        try:
+            session, chunk = self._chunk(request.key, request.payload)
+        except MalformedMessage as e:
+            self._drop(request, e)
+            return
+        self._ask(session, "gaze", chunk, [request])
+
+    def _on_stream(self, incoming: Incoming) -> None:
+        try:
+            session, chunk = self._chunk(incoming.key, incoming.payload)
+        except MalformedMessage:
+            self.metrics.dropped("malformed")
+            return
+        self._ask(session, "gaze", chunk, [])
+
+    def _chunk(self, text: str, payload: bytes) -> tuple[str, GazeChunk]:
+        key = parse_key(text)
+        if not isinstance(key, StreamKey):
+            raise MalformedMessage(f"{text} is no stream's key")
+        return key.session, decode(GazeChunk, payload)
+
+    def _drop(self, request: Request, error: MalformedMessage) -> None:
+        self.metrics.dropped("malformed")
+        request.refuse(encode(Problem.of(error)))
+
+    def _ask(self, session: str, procedure: str, message: Command | GazeChunk, requests: list[Request]) -> None:
+        asked = Asked(session, procedure, message, requests)
+        if asked.key is not None:
+            for waiting in self._waiting.get(session, ()):
+                if waiting.key == asked.key and waiting.message == message:
+                    waiting.requests += requests
+                    return
+        self.enqueue(asked)
+
+    # --- the turn ---
+
+    async def _turn(self) -> None:
+        if not self._queue:
+            self._wake.clear()
+            await self._wake.wait()
+        turn = _Turn()
+        touched: set[str] = set()
+        for _ in range(BATCH):
+            if not self._queue:
+                break
+            item = self._queue.popleft()
+            if isinstance(item, ReadFact):
+                self._apply(turn, item)
+                touched.add(item.fact.session)
+            elif isinstance(item, Asked):
+                self._answer(turn, item)
+            else:
+                item()
+        for session in touched:
+            for asked in self._waiting.pop(session, []):
+                self._answer(turn, asked)
+        self._commit(turn)
+        await asyncio.sleep(0)
+
+    def _apply(self, turn: _Turn, read: ReadFact) -> None:
+        session = read.fact.session
+        self.processed[session, read.owner] = read.seq
+        turn.batch.cursors[session, read.owner] = read.seq
+        if read.fact.subject not in self.core.reads[read.owner]:
+            return
+        self.metrics.read(read.fact.subject)
+        try:
+            self._take(turn, session, self.core.step(self._state(session), read.fact, self.clock.now()))
+        except ShiftError as e:
+            log.error("a fact could not be applied", session=session, subject=read.fact.subject, error=e.detail)
+            self.metrics.dropped("refused")
+        if isinstance(read.fact, Session) and read.fact.state == "ended":
+            turn.ended.add(session)
+
+    def _answer(self, turn: _Turn, asked: Asked) -> None:
+        """Carry out a command once; what it gives is told after the commit."""
+        try:
+            found = self._first_result(turn, asked)
+            if found is not None:
+                answer = Answer(owner=self.core.name, seq=self._head(turn, asked.session), repeat=True, result=found)
+                turn.answers.append((asked, answer))
+                return
+            step = self.core.step(self._state(asked.session), asked.message, self.clock.now(), late=asked.late)
+        except NotYet as e:
+            self._wait(asked, e)
+        except UnknownThing as e:
+            self._unknown(turn, asked, e)
+        except ShiftError as e:
+            self._refuse(turn, asked, e)
+        else:
+            self._take(turn, asked.session, step)
+            self._keep(turn, asked, step)
+
+    def _first_result(self, turn: _Turn, asked: Asked) -> dict[str, Any] | None:
+        if asked.key is None or not isinstance(asked.message, Command):
+            return None
+        stored = turn.batch.answers.get(asked.key) or self.journal.answer(asked.key)
+        if stored is None:
+            return None
+        if stored.digest != digest_of(asked.message.content()):
+            raise Conflict(f"{asked.procedure} {asked.message.command_id} was asked before with another content")
+        return stored.result
+
+    def _keep(self, turn: _Turn, asked: Asked, step: Step[S]) -> None:
+        if asked.key is not None and isinstance(asked.message, Command):
+            turn.batch.answers[asked.key] = StoredAnswer(digest_of(asked.message.content()), step.result)
+        answer = Answer(owner=self.core.name, seq=self._head(turn, asked.session), result=step.result)
+        turn.answers.append((asked, answer))
+
+    def _refuse(self, turn: _Turn, asked: Asked, error: ShiftError) -> None:
+        turn.refusals.append((asked, error))
+
+    def _take(self, turn: _Turn, session: str, step: Step[S]) -> None:
+        turn.before.setdefault(session, self.states.get(session))
+        self.states[session] = step.state
+        turn.batch.states[session] = ""
+        for fact in step.facts:
+            row = OutboxRow(
+                session=session,
+                seq=self._head(turn, session) + 1,
+                subject=fact.subject,
+                payload=fact.model_dump_json(),
+            )
+            turn.batch.rows.append(row)
+            turn.facts.append((row, fact))
+
+    def _head(self, turn: _Turn, session: str) -> int:
+        for row in reversed(turn.batch.rows):
+            if row.session == session:
+                return row.seq
+        return self.journal.heads.get(session, 0)
+
+    def _state(self, session: str) -> S | None:
+        if session not in self.states:
+            text = self.journal.state(session)
+            if text is None:
+                return None
+            self.states[session] = self.core.load(text)
+        return self.states[session]
+
+    # --- waiting ---
+
+    def _wait(self, asked: Asked, not_yet: NotYet) -> None:
+        loop = asyncio.get_running_loop()
+        if asked.deadline is None:
+            asked.deadline = loop.time() + not_yet.give_up_s
+            loop.call_later(not_yet.give_up_s, self._give_up, asked)
+            loop.call_later(min(HINT_WAIT_S, not_yet.give_up_s / 2), self._pull_for, asked, not_yet.owners)
+        self._waiting.setdefault(asked.session, []).append(asked)
+
+    def _pull_for(self, asked: Asked, owners: tuple[str, ...]) -> None:
+        if asked in self._waiting.get(asked.session, ()):
+            for owner in owners:
+                if owner in self.reader.owners:
+                    self.reader.pull_soon(owner)
+            asyncio.get_running_loop().call_later(4 * HINT_WAIT_S, self._pull_for, asked, owners)
+
+    def _give_up(self, asked: Asked) -> None:
+        waiting = self._waiting.get(asked.session, [])
+        if asked in waiting:
+            waiting.remove(asked)
+            asked.late = True
+            self.enqueue(asked)
+
+    def _unknown(self, turn: _Turn, asked: Asked, error: UnknownThing) -> None:
+        """Before something is called unknown, the owners are asked once more; without them nobody knows."""
+        if asked.checked or not self.reader.owners:
+            self._refuse(turn, asked, error)
+            return
+        asked.checked = True
+
+        async def ask_again() -> None:
+            silent = await self.reader.pull_all(self.reader.owners)
+            if silent and "recorder" in silent:
+                asked.refuse(Unavailable(f"the {self.core.name} cannot know yet: the {silent[0]} does not answer"))
+                return
+            self.enqueue(asked)
+
+        asyncio.get_running_loop().create_task(ask_again())
+
+    # --- the end of a turn ---
+
+    def _commit(self, turn: _Turn) -> None:
+        for session in turn.batch.states:
+            state = self.states[session]
+            assert state is not None
+            turn.batch.states[session] = self.core.dump(state)
+        turn.batch.closed |= turn.ended
+        if self._must_commit(turn):
+            try:
+                with self.metrics.commit_seconds.time():
+                    self.journal.commit(turn.batch)
+            except Unavailable as e:
+                self._undo(turn, e)
+                return
+            if self._alarm:
+                log.warning("the disk takes commits again")
+            self._alarm = ""
+        self._tell(turn)
+
+    def _must_commit(self, turn: _Turn) -> bool:
+        """Cursors alone can wait: what they passed over changed nothing."""
+        return bool(turn.batch.rows or turn.batch.states or turn.batch.answers or turn.batch.closed)
+
+    def _tell(self, turn: _Turn) -> None:
+        for row, fact in turn.facts:
+            self.publish(row, fact)
+        for asked, answer in turn.answers:
+            self.metrics.answered(asked.procedure, "repeat" if answer.repeat else "done")
+            payload = encode(answer)
+            for request in asked.requests:
+                request.reply(payload)
+        for asked, error in turn.refusals:
+            self.metrics.answered(asked.procedure, error.kind)
+            if not asked.requests:
+                self.metrics.dropped("refused")
+            asked.refuse(error)
+        for session in turn.ended:
+            self.states.pop(session, None)
+            self.reader.forget(session)
+        self.after_turn()
+
+    def after_turn(self) -> None:
+        """A place for what a service does once a turn is committed."""
+
+    def publish(self, row: OutboxRow, fact: Fact) -> None:
+        """Put a committed fact on the bus, as a hint."""
+        self.metrics.published(row.subject)
+        self.bus.put(
+            build_key(FactKey(row.session, row.subject)),
+            row.payload.encode(),
+            encoding=encoding_of(FACTS[row.subject]),
+            attachment=str(row.seq).encode(),
+        )
+
+    def _undo(self, turn: _Turn, error: Unavailable) -> None:
+        """Nothing of the turn happened: states go back, inputs are read again, askers are told."""
+        self._alarm = error.detail
+        self.metrics.commit_failed()
+        log.error("commit failed", error=error.detail)
+        for session, state in turn.before.items():
+            if state is None:
+                self.states.pop(session, None)
+            else:
+                self.states[session] = state
+        committed = self.journal.cursors()
+        for key in turn.batch.cursors:
+            self.reader.cursors[key] = self.processed[key] = committed.get(key, 0)
+        for asked, _ in turn.answers:
+            asked.refuse(error)
+        for asked, refused in turn.refusals:
+            asked.refuse(refused)

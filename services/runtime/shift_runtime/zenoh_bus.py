@@ -1,0 +1,208 @@
+"""The bus over Zenoh.
+
+Peer mode with explicit endpoints and gossip: processes meet at the router and then link directly, so
+that a router that dies is missed by newcomers only. No multicast: it does not cross a bridge network.
+Callbacks run in Zenoh's own thread (``indirect=False``), copy the bytes and hand over to the loop.
+Measured (DESIGN.md): 122 us a request that way, 365 us with the default callback.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import zenoh
+from zenoh.handlers import Callback
+
+from shift_runtime.bus import Handle, Incoming, Reply, Request
+
+T = TypeVar("T")
+
+
+def zenoh_config(mode: str, *, connect: str = "", listen: str = "") -> zenoh.Config:
+    """A configuration without any scouting; ``mode`` is peer, client or router."""
+    config = zenoh.Config()
+    entries: dict[str, Any] = {
+        "mode": mode,
+        "connect/endpoints": [connect] if connect else [],
+        "connect/timeout_ms": -1,
+        "connect/exit_on_failure": False,
+        "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
+        "listen/endpoints": [listen] if listen else [],
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": True,
+        "open/return_conditions/connect_scouted": False,
+        "open/return_conditions/declares": False,
+    }
+    for key, value in entries.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+class _Gate:
+    """Lets items over from Zenoh's thread into the loop, at most ``limit`` waiting; counts the rest."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        self._loop = loop
+        self._lock = threading.Lock()
+        self.dropped = 0
+
+    def handler(self, handle: Callable[[T], None], limit: int) -> Callable[[T], None]:
+        waiting = 0
+
+        def run(item: T) -> None:
+            nonlocal waiting
+            with self._lock:
+                waiting -= 1
+            handle(item)
+
+        def enqueue(item: T) -> None:
+            nonlocal waiting
+            with self._lock:
+                if waiting >= limit:
+                    self.dropped += 1
+                    return
+                waiting += 1
+            try:
+                self._loop.call_soon_threadsafe(run, item)
+            except RuntimeError:  # the loop is closed: the process is going
+                return
+
+        return enqueue
+
+
+@dataclass
+class _Request:
+    key: str
+    payload: bytes
+    query: zenoh.Query | None
+
+    def reply(self, payload: bytes) -> None:
+        if self.query is not None:
+            self.query.reply(self.key, payload)
+            self._done()
+
+    def refuse(self, payload: bytes) -> None:
+        if self.query is not None:
+            self.query.reply_err(payload)
+            self._done()
+
+    def _done(self) -> None:
+        if self.query is not None:
+            self.query.drop()  # type: ignore[no-untyped-call]
+            self.query = None
+
+
+@dataclass
+class _Handle:
+    thing: Any
+
+    def close(self) -> None:
+        if self.thing is not None:
+            self.thing.undeclare()
+            self.thing = None
+
+
+class ZenohBus:
+    """One Zenoh session. Make it by :meth:`open` within the loop that its handlers are to run in."""
+
+    def __init__(self, session: zenoh.Session, loop: asyncio.AbstractEventLoop) -> None:
+        self.session = session
+        self._loop = loop
+        self._gate = _Gate(loop)
+        self._handles: list[_Handle] = []
+
+    @classmethod
+    async def open(cls, connect: str, listen: str = "") -> ZenohBus:
+        """Open a session. A router that is not there yet is tried again in the background."""
+        mode = "peer" if listen else "client"
+        session = await asyncio.to_thread(zenoh.open, zenoh_config(mode, connect=connect, listen=listen))
+        return cls(session, asyncio.get_running_loop())
+
+    def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        self.session.put(
+            key,
+            payload,
+            encoding=encoding or None,
+            attachment=attachment or None,
+            congestion_control=zenoh.CongestionControl.DROP,
+        )
+
+    async def get(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[Reply]:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        replies: list[Reply] = []
+        done = asyncio.Event()
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                replies.append(Reply(True, reply.ok.payload.to_bytes()))
+            elif reply.err is not None and reply.err.payload:
+                replies.append(Reply(False, reply.err.payload.to_bytes()))
+
+        def on_end() -> None:
+            try:
+                self._loop.call_soon_threadsafe(done.set)
+            except RuntimeError:  # the loop is closed: the process is going
+                return
+
+        self.session.get(
+            key,
+            Callback(on_reply, on_end, indirect=False),
+            payload=payload or None,
+            timeout=timeout_s,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=zenoh.ConsolidationMode.NONE,
+        )
+        try:
+            await asyncio.wait_for(done.wait(), timeout_s + 0.5)
+        except TimeoutError:
+            return []
+        return replies
+
+    def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        enqueue = self._gate.handler(handler, limit)
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            attachment = sample.attachment
+            enqueue(
+                Incoming(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes() if attachment else b"")
+            )
+
+        return self._held(self.session.declare_subscriber(key, Callback(on_sample, indirect=False)))
+
+    def serve(self, key: str, handler: Callable[[Request], None], *, limit: int = 10_000) -> Handle:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        enqueue = self._gate.handler(handler, limit)
+
+        def on_query(query: zenoh.Query) -> None:
+            payload = query.payload
+            enqueue(_Request(str(query.key_expr), payload.to_bytes() if payload else b"", query))
+
+        return self._held(self.session.declare_queryable(key, Callback(on_query, indirect=False)))
+
+    def token(self, key: str) -> Handle:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        return self._held(self.session.liveliness().declare_token(key))
+
+    @property
+    def dropped(self) -> int:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        return self._gate.dropped
+
+    async def close(self) -> None:
+        """See :class:`~shift_runtime.bus.Bus`. A session that stays open hangs the process at its exit."""
+        for handle in self._handles:
+            handle.close()
+        self._handles.clear()
+        await asyncio.to_thread(self.session.close)
+
+    def _held(self, thing: Any) -> Handle:
+        handle = _Handle(thing)
+        self._handles.append(handle)
+        return handle
