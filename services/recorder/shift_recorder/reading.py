@@ -1,0 +1,312 @@
+"""Reads recordings: finished, unfinished, cut off anywhere, or damaged.
+
+One streaming pass that checks every checksum. A file that merely ends too early gives what came
+before, and :attr:`Recording.report` says so; a file that contradicts itself raises
+:class:`DamagedRecording` at that point, after messages that were right. Nothing else is raised, and
+memory stays bounded whatever the file claims (RELIABILITY.md, rows 13-15).
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zlib
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import NoneType
+from typing import NamedTuple, get_args
+
+from shift_schemas.codec import decode
+from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing, shorten
+from shift_schemas.messages import FACTS, Fact
+
+from shift_recorder import parsing as p
+
+MAXIMUM_HELD = 4 * 2**20
+"""Bytes of schemas, channels and metadata of one file that a reader keeps."""
+
+
+class RecordedMessage(NamedTuple):
+    """A message of a recording. Times in ns since the epoch; ``sequence`` is the owner's, modulo 2^32."""
+
+    topic: str
+    sequence: int
+    log_time: int
+    publish_time: int
+    data: bytes
+
+
+class RecordedFact(NamedTuple):
+    """A fact of a recording, with its owner's sequence and when it was recorded, ns."""
+
+    sequence: int
+    log_time: int
+    fact: Fact
+
+
+class Located(NamedTuple):
+    """A message and where it is: its chunk's offset in the file, its position in the unpacked chunk."""
+
+    chunk: int
+    position: int
+    message: RecordedMessage
+
+
+@dataclass(frozen=True)
+class Report:
+    """How far a file could be read, and why not further."""
+
+    complete: bool
+    damaged: bool = False
+    reason: str = "it has not been read to its end"
+    messages: int = 0
+    bytes: int = 0
+
+
+class _CutOff(Exception):
+    """The file ends within what should be there."""
+
+
+class Recording:
+    """A recording file. What it holds besides messages is known as far as it has been read.
+
+    Attributes
+    ----------
+    schemas : dict[str, bytes]
+        By topic.
+    metadata : dict[str, dict[str, str]]
+        By name; it stands in front of the messages.
+    attachments : dict[str, Attachment]
+        By name; they stand in front of the messages.
+    report : Report
+        After a pass: whether it was complete.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._clear()
+
+    def _clear(self) -> None:
+        self.library = ""
+        self.schemas: dict[str, bytes] = {}
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.attachments: dict[str, p.Attachment] = {}
+        self.report = Report(complete=False)
+        self._schemas: dict[int, p.SchemaRecord] = {}
+        self._channels: dict[int, p.ChannelRecord] = {}
+        self._held = self._attached = self._count = 0
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The topics that the file declares, with messages or without."""
+        return tuple(dict.fromkeys(channel.topic for channel in self._channels.values()))
+
+    def messages(self, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
+        """The messages in the file's order, all or those of ``topics``. Each call is a new pass.
+
+        Raises
+        ------
+        DamagedRecording
+            Where the file contradicts itself; what came before was right.
+        UnknownThing
+            There is no such file.
+        """
+        return (located.message for located in self.located(topics))
+
+    def facts(self, topics: Collection[str] | None = None) -> Iterator[RecordedFact]:
+        """The messages as the facts that they are. Raises as :meth:`messages`, also for a payload that is none."""
+        for m in self.messages(topics):
+            try:
+                yield RecordedFact(m.sequence, m.log_time, fact_of(m.topic, m.data))
+            except MalformedMessage as e:
+                raise DamagedRecording(f"{self.path.name}: {m.topic} {m.sequence}: {e.detail}") from e
+
+    def located(self, topics: Collection[str] | None = None) -> Iterator[Located]:
+        """As :meth:`messages`, with where each of them is."""
+        self._clear()
+        scan: _Scan | None = None
+        try:
+            with open(self.path, "rb") as stream:
+                scan = _Scan(stream)
+                for offset, opcode, body in scan.records():
+                    if opcode == p.CHUNK:
+                        yield from self._chunk(offset, body, topics)
+                    elif not scan.in_summary:
+                        self._take_in(opcode, body)
+            self.report = Report(True, reason="", messages=self._count, bytes=scan.good)
+        except _CutOff:
+            good = scan.good if scan else 0
+            reason = f"it was not finished: it ends before its footer, {good} bytes of it can be read"
+            self.report = Report(False, reason=reason, messages=self._count, bytes=good)
+        except FileNotFoundError as e:
+            raise UnknownThing(f"there is no recording {self.path.name}") from e
+        except (DamagedRecording, OSError) as e:
+            raise self._damaged(e, scan.good if scan else 0) from e
+
+    def _damaged(self, e: Exception, good: int) -> DamagedRecording:
+        why = e.detail if isinstance(e, DamagedRecording) else f"it cannot be read: {e}"
+        self.report = Report(False, damaged=True, reason=why, messages=self._count, bytes=good)
+        return DamagedRecording(f"{self.path.name}: after {good} bytes: {why}")
+
+    def _chunk(self, offset: int, body: memoryview, topics: Collection[str] | None) -> Iterator[Located]:
+        for opcode, position, record in p.records_in(p.chunk_content(body)):
+            if opcode == p.MESSAGE:
+                m = p.message_of(record)
+                channel = self._channels.get(m.channel_id)
+                if channel is None:
+                    raise DamagedRecording(f"a message is of channel {m.channel_id}, which there is not")
+                self._count += 1
+                if topics is None or channel.topic in topics:
+                    yield Located(offset, position, RecordedMessage(channel.topic, *m[1:]))
+            elif opcode in (p.SCHEMA, p.CHANNEL):
+                self._take_in(opcode, record)
+            else:
+                raise DamagedRecording(f"a record of kind {opcode} cannot stand in a chunk")
+
+    def _take_in(self, opcode: int, body: memoryview) -> None:
+        if opcode == p.ATTACHMENT:
+            self._attached += len(body)
+            _bounded(self._attached, p.MAXIMUM_BYTES)
+            attachment = p.attachment_of(body)
+            self.attachments[attachment.name] = attachment
+            return
+        self._held += 0 if opcode in (p.MESSAGE_INDEX, p.DATA_END) else len(body)
+        _bounded(self._held, MAXIMUM_HELD)
+        match opcode:
+            case p.HEADER:
+                _, self.library = p.header_of(body)
+            case p.SCHEMA:
+                schema = p.schema_of(body)
+                _same(self._schemas.setdefault(schema.id, schema), schema)
+            case p.CHANNEL:
+                self._add_channel(p.channel_of(body))
+            case p.METADATA:
+                name, values = p.metadata_of(body)
+                self.metadata[name] = values
+            case p.MESSAGE_INDEX:
+                p.check_message_index(body)
+
+    def _add_channel(self, channel: p.ChannelRecord) -> None:
+        _same(self._channels.setdefault(channel.id, channel), channel)
+        if channel.schema_id:
+            if channel.schema_id not in self._schemas:
+                raise DamagedRecording(f"channel {channel.id} has a schema that there is not")
+            self.schemas[channel.topic] = self._schemas[channel.schema_id].data
+
+
+class _Scan:
+    """The records of a file, one after the other, with the checksums of its two sections."""
+
+    def __init__(self, stream: io.BufferedReader) -> None:
+        self._stream = stream
+        self._left = os.fstat(stream.fileno()).st_size
+        self._crc = 0
+        self.good = 0  # bytes up to here were right
+        self.in_summary = False
+
+    def records(self) -> Iterator[tuple[int, int, memoryview]]:
+        """Offset, kind and body of each record."""
+        self._magic()
+        yield self._record({p.HEADER})
+        while True:
+            record = self._record(p.SUMMARY_SECTION if self.in_summary else p.DATA_SECTION)
+            yield record
+            if record[1] == p.FOOTER:
+                break
+        self._magic()
+        if self._left:
+            raise DamagedRecording(f"{self._left} bytes follow its end")
+
+    def _record(self, allowed: set[int]) -> tuple[int, int, memoryview]:
+        offset, crc = self.good, self._crc
+        head = self._take(p.HEAD.size)
+        opcode, length = p.HEAD.unpack(head)
+        p.check_head(opcode, length, allowed)
+        body = memoryview(self._take(length))
+        if opcode == p.DATA_END:
+            _check_section("data", crc, int.from_bytes(body, "little"))
+            self._crc, self.in_summary = 0, True
+        elif opcode == p.FOOTER:
+            _check_section("summary", zlib.crc32(head + body[:16], crc), int.from_bytes(body[16:], "little"))
+        self.good = offset + len(head) + length
+        return offset, opcode, body
+
+    def _take(self, n: int) -> bytes:
+        if n > self._left:
+            raise _CutOff
+        data = self._stream.read(n)
+        if len(data) != n:
+            raise _CutOff
+        self._left -= n
+        self._crc = zlib.crc32(data, self._crc)
+        return data
+
+    def _magic(self) -> None:
+        there = min(len(p.MAGIC), self._left)
+        if self._take(there) != p.MAGIC[:there]:
+            raise DamagedRecording("this is not the beginning or end of an MCAP file")
+        if there < len(p.MAGIC):
+            raise _CutOff
+        self.good += there
+
+
+def facts(path: Path) -> Iterator[RecordedFact]:
+    """The facts of the recording at ``path``, in its order; see :meth:`Recording.facts`."""
+    return Recording(path).facts()
+
+
+def fact_of(topic: str, data: bytes) -> Fact:
+    """The fact that a recorded message is. Raises :class:`MalformedMessage`."""
+    kind = FACTS.get(topic)
+    if kind is None:
+        raise MalformedMessage(f"{shorten(topic)!r} is no subject")
+    if left_out := _nullable(kind):
+        data = _with_nulls(data, left_out)
+    return decode(kind, data)
+
+
+def chunk_at(path: Path, offset: int) -> bytes:
+    """The unpacked chunk at an offset that :meth:`Recording.located` gave. Raises :class:`DamagedRecording`."""
+    try:
+        with open(path, "rb") as stream:
+            stream.seek(offset)
+            opcode, length = p.HEAD.unpack(stream.read(p.HEAD.size).ljust(p.HEAD.size, b"\0"))
+            p.check_head(opcode, length, {p.CHUNK})
+            return p.chunk_content(memoryview(stream.read(length)))
+    except (DamagedRecording, OSError) as e:
+        raise DamagedRecording(f"{path.name}: the chunk at byte {offset}: {e}") from e
+
+
+@cache
+def _nullable(kind: type[Fact]) -> tuple[str, ...]:
+    """Fields that must be there and may be ``None``: a recording leaves them out."""
+    fields = kind.model_fields.items()
+    return tuple(n for n, f in fields if f.is_required() and NoneType in get_args(f.annotation))
+
+
+def _with_nulls(data: bytes, names: tuple[str, ...]) -> bytes:
+    try:
+        plain = json.loads(data)
+    except (ValueError, RecursionError) as e:
+        raise MalformedMessage("it is not readable as JSON") from e
+    if not isinstance(plain, dict):
+        return data
+    return json.dumps({**dict.fromkeys(names), **plain}).encode()
+
+
+def _bounded(held: int, most: int) -> None:
+    if held > most:
+        raise DamagedRecording(f"it holds more than {most} bytes of schemas, metadata or attachments")
+
+
+def _same(one: object, other: object) -> None:
+    if one != other:
+        raise DamagedRecording("it gives the same schema or channel twice, and differently")
+
+
+def _check_section(what: str, found: int, crc: int) -> None:
+    if crc and crc != found:
+        raise DamagedRecording(f"the checksum of its {what} section is {crc:08x} and should be {found:08x}")

@@ -1,0 +1,102 @@
+"""MCAP as SHIFT writes it: one ``json`` channel per subject, zstd chunks, every checksum on.
+
+Profile "", library ``shift-mesh/x.y``, non-zero schema ids. Segments and finished files are both
+written by :class:`RecordingWriter`; when a chunk ends and what a file is called is theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from mcap.writer import CompressionType, Writer
+from shift_schemas.errors import MalformedMessage, TooLarge, shorten
+from shift_schemas.keys import SUBJECTS
+
+from shift_recorder.mcap_schemas import schema_name
+from shift_recorder.parsing import Attachment
+from shift_recorder.storage import DurableFile
+
+MAXIMUM_PAYLOAD = 8 * 2**20
+"""Bytes of one message; a door's limit is 256 KB, and a chunk must stay below what a reader takes."""
+
+SESSION_METADATA = "shift:session"
+CONFIG_METADATA = "shift:config"
+
+
+def library() -> str:
+    """``shift-mesh/0.1.0``."""
+    try:
+        return f"shift-mesh/{version('shift-mesh')}"
+    except PackageNotFoundError:
+        return "shift-mesh/unknown"
+
+
+class RecordingWriter:
+    """Writes one MCAP file, front to end. Not for several threads at once.
+
+    Parameters
+    ----------
+    file
+        Where to; stays the caller's to sync and close.
+    schemas
+        The schema of each of the subjects (``mcap_schemas.subject_schemas``).
+    chunk_bytes
+        A chunk ends when it is larger than this, uncompressed.
+    """
+
+    def __init__(self, file: DurableFile, schemas: Mapping[str, bytes], chunk_bytes: int) -> None:
+        self._writer: Any = Writer(  # Any: mcap leaves half of its methods without types
+            file,  # type: ignore[arg-type]  # it asks for write, tell and flush only
+            chunk_size=chunk_bytes,
+            compression=CompressionType.ZSTD,
+            enable_crcs=True,
+            enable_data_crcs=True,
+        )
+        self._writer.start(profile="", library=library())
+        self._channels = {subject: self._channel(subject, schemas[subject]) for subject in SUBJECTS}
+
+    def _channel(self, subject: str, schema: bytes) -> int:
+        schema_id = self._writer.register_schema(schema_name(subject), "jsonschema", schema)
+        channel: int = self._writer.register_channel(subject, "json", schema_id)
+        return channel
+
+    def message(self, subject: str, sequence: int, log_time: int, publish_time: int, data: bytes) -> None:
+        """One message; ``sequence`` is its owner's and is kept modulo 2^32, times in ns.
+
+        All is checked first: a number that does not fit would leave half a record in the chunk.
+
+        Raises
+        ------
+        MalformedMessage
+            Unknown subject, a negative sequence, a time that is no unsigned 64 bit number.
+        TooLarge
+            Above ``MAXIMUM_PAYLOAD``.
+        """
+        channel = self._channels.get(subject)
+        if channel is None:
+            raise MalformedMessage(f"{shorten(subject)!r} is none of {', '.join(self._channels)}")
+        if sequence < 0 or not (0 <= log_time < 2**64 and 0 <= publish_time < 2**64):
+            raise MalformedMessage(f"{subject} {sequence}: sequence and times must be 0 or more")
+        if len(data) > MAXIMUM_PAYLOAD:
+            raise TooLarge(f"{subject} {sequence} has {len(data)} bytes; at most {MAXIMUM_PAYLOAD} are recorded")
+        self._writer.add_message(
+            channel, log_time=log_time, data=data, publish_time=publish_time, sequence=sequence & 0xFFFFFFFF
+        )
+
+    def metadata(self, name: str, values: Mapping[str, str]) -> None:
+        """A metadata record."""
+        self._writer.add_metadata(name, dict(values))
+
+    def attachment(self, a: Attachment) -> None:
+        """An attachment."""
+        self._writer.add_attachment(a.log_time, a.log_time, a.name, a.media_type, a.data)
+
+    def close_chunk(self) -> None:
+        """Writes the chunk in progress, if it has messages: until then it is in memory only."""
+        self._writer.flush()
+
+    def finish(self) -> None:
+        """Writes the last chunk, the indexes, the statistics and the footer."""
+        self._writer.finish()
