@@ -1,0 +1,132 @@
+"""One simulated session, an event at a time, through the very cores that the services run.
+
+Pure: no bus, no clock. It meets the same people and the same draws as ``dynamics`` does for many runs at once, and
+the live driver over HTTP; with a discount of 0 all three agree step by step for the same session seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from shift_decider import core as decider
+from shift_learner import core as learner
+from shift_monitor import core as monitor
+from shift_schemas.messages import (
+    Config,
+    Decide,
+    Decision,
+    Fact,
+    GazeChunk,
+    Observation,
+    Performance,
+    ReportPerformance,
+    Result,
+    Session,
+)
+from shift_schemas.stamps import Stamp
+from shift_schemas.study import Study
+from shift_schemas.study_text import study_json
+from shift_schemas.words import Triple
+
+from shift_simulator.gaze_plan import chunk_of, plan_gaze
+from shift_simulator.people import SimulatedPerson, person, task_names
+from shift_simulator.users import User
+
+SESSION = "simulated"
+SOURCE = "simulator"
+
+
+class Episode(NamedTuple):
+    """One interaction: what was seen at the decision, the decision, and how it went."""
+
+    observation: Observation
+    decision: Decision
+    action: int
+    performance: Performance
+
+
+def play(user: User, study: Study, seed: int, episodes: int) -> Iterator[Episode]:
+    """A session of ``episodes`` interactions with the session seed ``seed``."""
+    mesh = Mesh(study, seed)
+    someone = person(user, study, seed)
+    tasks = task_names(user, study)
+    for n in range(1, episodes + 1):
+        mesh.look(someone, n)
+        observation = mesh.observation
+        decision = mesh.decide(tasks[someone.next_task(n)], n)
+        action = decision.actions.index(decision.strategy)
+        performance = mesh.report(someone, decision, action)
+        someone = someone.executed(action)
+        yield Episode(observation, decision, action, performance)
+
+
+@dataclass
+class Mesh:
+    """The three cores, each fact handed to those who read it at once."""
+
+    study: Study
+    seed: int
+
+    def __post_init__(self) -> None:
+        self._now = Stamp.of(0)
+        self._monitor: monitor.MonitorState | None = None
+        self._decider: decider.DeciderState | None = None
+        self._learner: learner.LearnerState | None = None
+        self._clock_ns = 0
+        self._chunks = 0
+        start = Session(
+            session=SESSION, stamp=self._now, participant="P00", study=self.study.study, seed=self.seed,
+            state="live", started=self._now,
+        )  # fmt: skip
+        self._pass_on(start)
+        self._pass_on(Config(session=SESSION, stamp=self._now, version=1, study=study_json(self.study)))
+
+    def look(self, someone: SimulatedPerson, n: int) -> None:
+        """Bring the person's gaze class about."""
+        looks = plan_gaze(self.study, self.observation.gaze, someone.wanted_gaze(n))
+        if looks:
+            chunk, self._clock_ns = chunk_of(self.study, looks, SOURCE, self._chunks, self._clock_ns)
+            self._chunks += 1
+            self._pass_on(chunk)
+
+    def decide(self, task: str, n: int) -> Decision:
+        """The next decision."""
+        done = decider.step(self._decider, Decide(command_id=f"d{n}", session=SESSION, task=task), self._now)
+        self._decider = done.state
+        for fact in done.facts:
+            self._pass_on(fact)
+        decision = done.facts[-1]
+        assert isinstance(decision, Decision)
+        return decision
+
+    def report(self, someone: SimulatedPerson, decision: Decision, action: int) -> Performance:
+        """How the person does, reported."""
+        seen = decision.observation
+        outcome = someone.perform(decision.n, Triple(seen.capacity, seen.gaze, seen.awareness), action)
+        command = ReportPerformance(
+            command_id=decision.decision_id, session=SESSION,
+            comprehension=Result(success=outcome.success, duration_s=outcome.comprehension_s),
+            enabledness=Result(success=outcome.success, duration_s=outcome.enabledness_s),
+        )  # fmt: skip
+        done = learner.step(self._learner, command, self._now)
+        self._learner = done.state
+        for fact in done.facts:
+            self._pass_on(fact)
+        return next(fact for fact in done.facts if isinstance(fact, Performance))
+
+    def _pass_on(self, event: Fact | GazeChunk) -> None:
+        """A fact or a chunk of gaze, to all cores, with what follows from it."""
+        watched = monitor.step(self._monitor, event, self._now)
+        self._monitor = watched.state
+        facts = list(watched.facts)
+        if isinstance(event, Fact):
+            learned = learner.step(self._learner, event, self._now)
+            self._learner = learned.state
+            facts += learned.facts
+            self._decider = decider.step(self._decider, event, self._now).state
+        for fact in facts:
+            if isinstance(fact, Observation):
+                self.observation = fact
+            self._decider = decider.step(self._decider, fact, self._now).state

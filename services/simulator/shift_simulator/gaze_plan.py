@@ -1,0 +1,137 @@
+"""Gaze that brings a gaze class about: where to look, and for how long, until the monitor says so.
+
+Pure, and faster than real time: samples are AOI names on a clock of the simulator's own. The plan is found by
+trying looks out on the monitor's own rules (``shift_monitor.attention``): a steady look, turns between AOIs, and a
+steady look after the turns, each from where attention is now and after a calm look.
+
+A chunk ends with a sample on no AOI: the last sample of a source has no dwell yet, and so nothing of it is left
+over for the next chunk but ``LEAD_NS`` on nothing, too short to become the held target.
+
+What cannot be reached, whatever one looks at: with one AOI the dominance is always 1 and the focus shift only
+falls, so a session of it becomes focused and stays so; with two AOIs the dominance is at least 0.5, so both other
+classes need the focus shift to rise (``shift_increase`` above 0); *focused* needs both the weights to move and the
+shift to fall. Then :class:`InvalidSettings` says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from shift_monitor.areas import NOWHERE
+from shift_monitor.attention import Attention, Dwell, dwelt, gaze_class
+from shift_schemas.errors import InvalidSettings
+from shift_schemas.messages import GazeChunk, GazeView
+from shift_schemas.stamps import NS
+from shift_schemas.study import Study
+from shift_schemas.words import GazeClass
+
+LEAD_NS = 1_000_000
+"""From the end of one chunk to the start of the next, ns; chosen: far below the shortest fixation."""
+TURNS = 48
+"""Chosen: more turns between AOIs than it takes from any state with the default settings (8)."""
+LOOKS = 240
+"""Chosen: more steady looks in a row than it takes from any state with the default settings (20)."""
+
+
+class Look(NamedTuple):
+    """Gaze on one AOI (its index) for a while."""
+
+    target: int
+    duration_ns: int
+
+
+def plan_gaze(study: Study, view: GazeView, wanted: GazeClass) -> tuple[Look, ...]:
+    """The looks after which the monitor's gaze class is the ``wanted`` one; none where it is that already.
+
+    Parameters
+    ----------
+    view
+        Attention as the newest observation shows it, all earlier gaze of the session being of such plans.
+
+    Raises
+    ------
+    InvalidSettings
+        The class cannot be reached with this study's AOIs and attention settings.
+    """
+    if view.category == wanted:
+        return ()
+    return _searched(study, _attention(study, view), wanted)
+
+
+def chunk_of(study: Study, looks: tuple[Look, ...], source: str, seq: int, clock_ns: int) -> tuple[GazeChunk, int]:
+    """The looks as a chunk that begins ``LEAD_NS`` after ``clock_ns``, and the clock at its end."""
+    times, names = [], []
+    now_ns = clock_ns + LEAD_NS
+    longest_ns = round(study.attention.maximum_dwell_s * NS)
+    for look in looks:
+        for start_ns in range(0, look.duration_ns, longest_ns):
+            times.append((now_ns + start_ns) / NS)
+            names.append(study.aoi_names[look.target])
+        now_ns += look.duration_ns
+    return GazeChunk(source=source, seq=seq, t=[*times, now_ns / NS], aoi=[*names, None]), now_ns
+
+
+# --- the search ---
+
+
+def _searched(study: Study, start: Attention, wanted: GazeClass) -> tuple[Look, ...]:
+    aois = tuple(range(len(study.aois)))
+    rings = (aois[:2], aois) if len(aois) > 2 else (aois,)
+    for calm in (False, True):
+        for ring in rings:
+            for looks, attention in _program(study, start, ring, calm):
+                if gaze_class(attention, study.attention) == wanted:
+                    return looks
+    raise InvalidSettings(
+        f"no gaze on the {len(aois)} AOIs of study {study.study} makes the gaze class {wanted} "
+        f"with its attention settings"
+    )
+
+
+def _program(
+    study: Study, start: Attention, ring: tuple[int, ...], calm: bool
+) -> Iterator[tuple[tuple[Look, ...], Attention]]:
+    """What attention becomes: after 0, 1, ... turns through ``ring``, and after each along a steady look."""
+    hold_ns, unit_ns = _hold_ns(study), _unit_ns(study)
+    here = start.held if start.held != NOWHERE else start.weights.index(max(start.weights))
+    looks: tuple[Look, ...] = ()
+    if calm:
+        looks, start = _steady(study, looks, start, here, unit_ns, LOOKS)
+    for turn in range(TURNS):
+        if looks:
+            yield looks, start
+        for steady in (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128, LOOKS):
+            yield _steady(study, looks, start, here, unit_ns, steady)
+        here = next(a for a in (*ring[turn % len(ring) :], *ring) if a != here) if len(ring) > 1 else here
+        looks, start = _steady(study, looks, start, here, hold_ns, 1)
+
+
+def _steady(
+    study: Study, looks: tuple[Look, ...], attention: Attention, target: int, duration_ns: int, times: int
+) -> tuple[tuple[Look, ...], Attention]:
+    """One look of ``times`` x ``duration_ns`` more, cut as :func:`chunk_of` cuts it."""
+    whole = Look(target, duration_ns * times)
+    longest_ns = round(study.attention.maximum_dwell_s * NS)
+    until_ns = attention.until_ns or 0
+    for start_ns in range(0, whole.duration_ns, longest_ns):
+        dwell = Dwell(target, until_ns + start_ns, min(longest_ns, whole.duration_ns - start_ns))
+        attention = dwelt(attention, dwell, _hold_ns(study), 0, study.attention)
+    return (*looks, whole), attention
+
+
+def _attention(study: Study, view: GazeView) -> Attention:
+    """Attention after the lead on nothing that each chunk begins with."""
+    held = study.aoi_names.index(view.aoi) if view.aoi else NOWHERE
+    weights = tuple(view.weights[name] for name in study.aoi_names)
+    return Attention(weights, view.focus_shift, held, NOWHERE, LEAD_NS, 0, met=True)
+
+
+def _hold_ns(study: Study) -> int:
+    """How long a look takes to become the held target, as the monitor rounds it."""
+    return round(study.fixation.minimum_duration_s * NS)
+
+
+def _unit_ns(study: Study) -> int:
+    """A steady look's length: an application of the equations, or what it takes to be held."""
+    return max(round(study.attention.step_s * NS), _hold_ns(study))

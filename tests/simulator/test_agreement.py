@@ -1,0 +1,55 @@
+"""The vectorised simulation and the services' own cores agree step by step for the same session seed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shift_learner.learner import Context
+from shift_schemas.randomness import uniform
+from shift_schemas.study import Study
+from shift_schemas.words import Triple
+from shift_simulator.batch import batch_learner
+from shift_simulator.draws import SESSION, session_seed, session_seeds
+from shift_simulator.dynamics import simulate
+from shift_simulator.events import Episode, play
+from shift_simulator.users import User, paper_user
+
+EPISODES = 60
+
+
+def triple_of(episode: Episode) -> int:
+    seen = episode.decision.observation
+    return Triple(seen.capacity, seen.gaze, seen.awareness).number
+
+
+def check_agreement(user: User, study: Study, runs: int, episodes: int = EPISODES) -> None:
+    seeds = session_seeds(3, runs)
+    trace = simulate(user, study, batch_learner(Context(study), runs), seeds, episodes)
+    for run, seed in enumerate(seeds):
+        played = list(play(user, study, int(seed), episodes))
+        assert [triple_of(e) for e in played] == trace.triple[:, run].tolist()
+        assert [e.action for e in played] == trace.action[:, run].tolist()
+        assert [e.performance.reward for e in played] == trace.reward[:, run].tolist()
+        assert [e.performance.cumulative_reward for e in played] == trace.cumulative[:, run].tolist()
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "D"])
+@pytest.mark.parametrize("learner", [{}, {"scoring_prior": False}, {"name": "scoring"}])
+def test_many_runs_at_once_meet_what_the_cores_meet(name: str, learner: dict[str, object]) -> None:
+    study = Study.model_validate({"study": "s", "learner": learner})
+    check_agreement(paper_user(name), study, runs=2)
+
+
+def test_a_person_whose_true_capacity_differs_and_who_changes_agrees_too() -> None:
+    user = paper_user("B").model_dump()
+    change = {"at": 20, "success": np.random.default_rng(1).random((30, 6)).tolist()}
+    differs = {"capacity": {"recovery": 0.1, "threshold": 0.4}, "changes": [change], "gaze": {"keep": 0.8}, "tasks": 5}
+    check_agreement(User.model_validate(user | differs), Study(study="s"), runs=3)
+
+
+def test_session_seeds_are_addressed_and_fit_into_a_double() -> None:
+    seeds = session_seeds(7, 50)
+    assert seeds.tolist() == [session_seed(7, run) for run in range(50)]
+    assert seeds.tolist() == [int(uniform(7, run, SESSION) * 2**53) for run in range(50)]
+    assert len(set(seeds.tolist())) == 50
+    assert seeds.max() < 2**53

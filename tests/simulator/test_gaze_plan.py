@@ -1,0 +1,80 @@
+"""Planned gaze brings every gaze class about, judged by the monitor's core itself."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import pytest
+from shift_monitor import core
+from shift_schemas.errors import InvalidSettings
+from shift_schemas.messages import Config, Observation, Session
+from shift_schemas.stamps import Stamp
+from shift_schemas.study import Study
+from shift_schemas.study_text import study_json
+from shift_schemas.words import GAZES, GazeClass
+from shift_simulator.gaze_plan import chunk_of, plan_gaze
+
+NOW = Stamp.of(0)
+
+
+def study_with(aois: int, **attention: float) -> Study:
+    names = [{"name": f"a{i}", "rectangle": [i / aois, 0.0, (i + 1) / aois, 1.0]} for i in range(aois)]
+    return Study.model_validate({"study": "s", "aois": names, "attention": attention})
+
+
+def classes_reached(study: Study, wanted: list[GazeClass]) -> list[GazeClass]:
+    session = Session(session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW)
+    state = core.step(None, session, NOW).state
+    done = core.step(state, Config(session="s", stamp=NOW, version=1, study=study_json(study)), NOW)
+    clock_ns, found = 0, list[GazeClass]()
+    for seq, gaze in enumerate(wanted):
+        observation = done.facts[-1]
+        assert isinstance(observation, Observation)
+        if looks := plan_gaze(study, observation.gaze, gaze):
+            chunk, clock_ns = chunk_of(study, looks, "sim", seq, clock_ns)
+            done = core.step(done.state, chunk, NOW)
+        after = done.facts[-1]
+        assert isinstance(after, Observation)
+        found.append(after.gaze.category)
+    return found
+
+
+ALL_PAIRS = [g for pair in product(GAZES, GAZES) for g in pair] + [g for pair in product(GAZES, GAZES) for g in pair]
+
+
+@pytest.mark.parametrize("aois", [2, 3, 4, 7, 12])
+def test_every_class_follows_every_class(aois: int) -> None:
+    assert classes_reached(study_with(aois), ALL_PAIRS) == ALL_PAIRS
+
+
+@pytest.mark.parametrize(
+    "attention",
+    [
+        {"shift_increase": 0.05, "shift_decrease": 0.2},
+        {"shift_increase": 0.7},
+        {"weight_step": 0.01},
+        {"step_s": 0.5, "maximum_dwell_s": 0.03},
+        {"weight_min": 0.1},
+        {"focused_dominance": 0.8, "focused_shift": 0.1},
+    ],
+)
+def test_other_attention_settings_are_planned_for(attention: dict[str, float]) -> None:
+    assert classes_reached(study_with(3, **attention), ALL_PAIRS) == ALL_PAIRS
+
+
+def test_what_no_gaze_can_reach_is_said() -> None:
+    one = study_with(1)
+    assert classes_reached(one, ["uncertain", "focused"]) == ["uncertain", "focused"]
+    with pytest.raises(InvalidSettings, match="no gaze on the 1 AOIs of study s makes the gaze class distracted"):
+        classes_reached(one, ["distracted"])
+
+
+def test_a_plan_is_the_same_every_time_and_nothing_where_nothing_is_to_be_done() -> None:
+    study = study_with(3)
+    observation = core.observation_of
+    session = Session(session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW)
+    state = core.step(None, session, NOW).state
+    state = core.step(state, Config(session="s", stamp=NOW, version=1, study=study_json(study)), NOW).state
+    view = observation(state, NOW).gaze
+    assert plan_gaze(study, view, "uncertain") == ()
+    assert plan_gaze(study, view, "distracted") == plan_gaze(study, view, "distracted")
