@@ -31,6 +31,22 @@ SUBJECTS: tuple[str, ...] = (
 )  # fmt: skip
 """Subjects in INTERFACE.md's order; they are the recording's topics."""
 
+READS: dict[str, dict[str, frozenset[str]]] = {
+    "recorder": dict.fromkeys(OWNERS, frozenset()),
+    "monitor": {
+        "recorder": frozenset({"session", "config"}),
+        "decider": frozenset({"decision"}),
+        "learner": frozenset({"performance"}),
+    },
+    "decider": {
+        "recorder": frozenset({"session", "config"}),
+        "monitor": frozenset({"observation"}),
+        "learner": frozenset({"policy"}),
+    },
+    "learner": {"recorder": frozenset({"session", "config"}), "decider": frozenset({"decision"})},
+}
+"""Whose journals each service reads, and which of their subjects its core steps on (the recorder: it files all)."""
+
 OWNER_OF: dict[str, str] = {subject: owner for owner, subjects in OWNERS.items() for subject in subjects}
 
 PROCEDURES: dict[str, tuple[str, ...]] = {

@@ -367,6 +367,8 @@ class StartSession(Command):
     seed: Annotated[int, Field(ge=0, lt=2**53)] | None = None
     condition: Id | None = None
     replay_of: str = ""
+    software: str = ""
+    revision: str = ""
 
 
 class EndSession(Command):

@@ -140,7 +140,7 @@ def _rule(found: Any, path: Path, value: str) -> str:
 def _fields_at(path: Path) -> Iterator[str]:
     here: Any = Study
     for part in path:
-        field = here.model_fields.get(part) if isinstance(here, type) and issubclass(here, BaseModel) else None
+        field = here.model_fields.get(str(part)) if isinstance(here, type) and issubclass(here, BaseModel) else None
         here = _model_in(field.annotation) if field else None
     if isinstance(here, type) and issubclass(here, BaseModel):
         yield from here.model_fields

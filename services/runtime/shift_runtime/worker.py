@@ -61,7 +61,7 @@ STREAM_LIMIT = 5_000
 class CoreStep(Protocol[S]):
     """A core's fold."""
 
-    def __call__(self, state: S | None, message: Any, now: Stamp, late: bool = False) -> Step[S]: ...
+    def __call__(self, state: S | None, message: Any, now: Stamp, /, late: bool = False) -> Step[S]: ...
 
 
 @dataclass(frozen=True)
@@ -161,6 +161,10 @@ class Worker(Generic[S]):
 
     async def on_stop(self) -> None:
         """A place for a service's own tidying."""
+
+    def prepare(self, message: Command | GazeChunk) -> Command | GazeChunk:
+        """A place for what a command needs of the world before the pure core can carry it out."""
+        return message
 
     @property
     def ready(self) -> bool:
@@ -292,6 +296,8 @@ class Worker(Generic[S]):
 
     def _apply(self, turn: _Turn, read: ReadFact) -> None:
         session = read.fact.session
+        if read.seq != self.processed.get((session, read.owner), 0) + 1:
+            return  # a commit failed meanwhile: this one is read again in its turn
         self.processed[session, read.owner] = read.seq
         turn.batch.cursors[session, read.owner] = read.seq
         if read.fact.subject not in self.core.reads[read.owner]:
@@ -313,7 +319,8 @@ class Worker(Generic[S]):
                 answer = Answer(owner=self.core.name, seq=self._head(turn, asked.session), repeat=True, result=found)
                 turn.answers.append((asked, answer))
                 return
-            step = self.core.step(self._state(asked.session), asked.message, self.clock.now(), late=asked.late)
+            message = self.prepare(asked.message)
+            step = self.core.step(self._state(asked.session), message, self.clock.now(), late=asked.late)
         except NotYet as e:
             self._wait(asked, e)
         except UnknownThing as e:

@@ -1,0 +1,8 @@
+"""``python -m shift_decider``: the decider as a process. Settings are environment variables, ``SHIFT_...``."""
+
+from shift_runtime.process import run_service
+
+from shift_decider.service import CORE
+
+if __name__ == "__main__":
+    run_service(CORE)

@@ -1,0 +1,17 @@
+"""The decider's shell: what it takes in, by whom. The worker does the rest."""
+
+from __future__ import annotations
+
+from shift_runtime.worker import Core
+from shift_schemas.keys import READS
+
+from shift_decider import core
+from shift_decider.core import DeciderState
+
+CORE: Core[DeciderState] = Core(
+    name="decider",
+    step=core.step,
+    dump=core.dump,
+    load=core.load,
+    reads=READS["decider"],
+)

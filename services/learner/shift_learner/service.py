@@ -1,0 +1,17 @@
+"""The learner's shell: what it takes in, by whom. The worker does the rest."""
+
+from __future__ import annotations
+
+from shift_runtime.worker import Core
+from shift_schemas.keys import READS
+
+from shift_learner import core
+from shift_learner.core import LearnerState
+
+CORE: Core[LearnerState] = Core(
+    name="learner",
+    step=core.step,
+    dump=core.dump,
+    load=core.load,
+    reads=READS["learner"],
+)

@@ -1,0 +1,16 @@
+"""The monitor's shell: what it takes in, by whom. The worker does the rest."""
+
+from __future__ import annotations
+
+from shift_monitor import core
+from shift_monitor.core import MonitorState
+from shift_runtime.worker import Core
+from shift_schemas.keys import READS
+
+CORE: Core[MonitorState] = Core(
+    name="monitor",
+    step=core.step,
+    dump=core.dump,
+    load=core.load,
+    reads=READS["monitor"],
+)

@@ -1,0 +1,170 @@
+"""The recorder's core: ``step(state, command, now) -> Step``. Pure.
+
+It owns the session (start, end, configure, mark). Studies by name are looked up, and recordings
+finished, by the shell; here they arrive resolved.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+from pydantic import TypeAdapter
+from shift_schemas.errors import Conflict, FieldError, MalformedMessage, UnknownThing
+from shift_schemas.messages import Command, Config, Configure, EndSession, Fact, Mark, Marker, Session, StartSession
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import Step
+from shift_schemas.study import Study, fixed_changes
+from shift_schemas.study_text import patched, study_data, study_in_force, study_json, study_of
+
+START_ID = "start"
+END_ID = "end"
+"""Start and end have no id of their own: a session has one of each, and a repeat gets the first result."""
+
+
+class FinishSession(EndSession):
+    """The second half of an end: the recording is finished. Its content is that of the end it completes."""
+
+    procedure: ClassVar[str] = "end_session"
+
+    recording: str
+    sha256: str
+    counts: dict[str, int]
+
+    def content(self) -> str:
+        """The end's."""
+        return EndSession(command_id=self.command_id, session=self.session).content()
+
+
+@dataclass(frozen=True)
+class RecorderState:
+    """All that the recorder decides about one session."""
+
+    fact: Session
+    config: Config
+    original: str
+    """The study as given, before its condition, as JSON; it is attached to the recording."""
+
+
+_STATE = TypeAdapter(RecorderState)
+
+
+def dump(state: RecorderState) -> str:
+    """The state as JSON; :func:`load` takes it back exactly."""
+    return _STATE.dump_json(state).decode()
+
+
+def load(text: str) -> RecorderState:
+    """The state that :func:`dump` wrote."""
+    return _STATE.validate_json(text)
+
+
+def seed_of(session: str) -> int:
+    """The seed of a session that was given none: made from its id, so that a restart gives the same."""
+    return int.from_bytes(hashlib.sha256(session.encode()).digest()[:6], "big")
+
+
+def session_answer(fact: Session) -> dict[str, Any]:
+    """A session as the doors show it."""
+    data: dict[str, Any] = fact.model_dump(mode="json", exclude={"stamp", "seen", "subject"})
+    return data
+
+
+def step(state: RecorderState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[RecorderState]:
+    """Carry out one command.
+
+    Raises
+    ------
+    UnknownThing, Conflict, MalformedMessage
+        The command cannot be carried out.
+    """
+    if isinstance(message, StartSession):
+        return _start(state, message, now)
+    if state is None:
+        raise UnknownThing(f"there is no session {message.session}")
+    match message:
+        case FinishSession():
+            return _finish(state, message, now)
+        case EndSession():
+            return _end(state, now)
+        case Configure():
+            return _configure(state, message, now)
+        case Mark():
+            return _mark(state, message, now)
+    return Step(state)
+
+
+def _start(state: RecorderState | None, command: StartSession, now: Stamp) -> Step[RecorderState]:
+    if state is not None:
+        raise Conflict(f"session {command.session} is there already, with another content")
+    study = study_of(command.study)
+    in_force = study_in_force(study, command.condition)
+    fact = Session(
+        session=command.session, stamp=now, participant=command.participant, study=study.study,
+        condition=command.condition, seed=seed_of(command.session) if command.seed is None else command.seed,
+        state="live", started=now, replay_of=command.replay_of,
+        software=command.software, revision=command.revision,
+    )  # fmt: skip
+    config = Config(session=command.session, stamp=now, version=1, study=study_json(in_force))
+    original = json.dumps(study_data(study), ensure_ascii=False)
+    return Step(RecorderState(fact, config, original), (fact, config), session_answer(fact))
+
+
+def _end(state: RecorderState, now: Stamp) -> Step[RecorderState]:
+    if state.fact.state != "live":
+        return Step(state)
+    fact = state.fact.model_copy(update={"stamp": now, "state": "ending"})
+    return Step(replace(state, fact=fact), (fact,))
+
+
+def ended(state: RecorderState, now: Stamp) -> Session:
+    """The session as it ended, as its own recording has it (which cannot hold its own checksum)."""
+    name = f"{state.fact.session}.mcap"
+    return state.fact.model_copy(update={"stamp": now, "state": "ended", "ended": now, "recording": name})
+
+
+def _finish(state: RecorderState, command: FinishSession, now: Stamp) -> Step[RecorderState]:
+    update = {"sha256": command.sha256, "counts": command.counts, "recording": command.recording}
+    fact = ended(state, now).model_copy(update=update)
+    result = {
+        "session": fact.session, "state": "ended", "recording": fact.recording,
+        "sha256": fact.sha256, "counts": fact.counts,
+    }  # fmt: skip
+    return Step(replace(state, fact=fact), (fact,), result)
+
+
+def _configure(state: RecorderState, command: Configure, now: Stamp) -> Step[RecorderState]:
+    _check_live(state)
+    before = study_of(json.loads(state.config.study))
+    after = patched(before, command.patch)
+    check_changeable(before, after)
+    config = Config(session=command.session, stamp=now, version=state.config.version + 1, study=study_json(after))
+    return Step(replace(state, config=config), (config,), config_answer(config))
+
+
+def config_answer(config: Config) -> dict[str, Any]:
+    """The study in force with its version, as the doors show it."""
+    return {**json.loads(config.study), "version": config.version}
+
+
+def check_changeable(before: Study, after: Study) -> None:
+    """Raise :class:`MalformedMessage` that names what must not change while a session runs."""
+    if names := fixed_changes(before, after):
+        rule = "it cannot change while a session runs; end the session and start another one"
+        raise MalformedMessage(
+            f"{', '.join(names)} cannot change while a session runs",
+            tuple(FieldError(field=name, value="", rule=rule) for name in names),
+        )
+
+
+def _mark(state: RecorderState, command: Mark, now: Stamp) -> Step[RecorderState]:
+    _check_live(state)
+    fact = Marker(session=command.session, stamp=now, marker_id=command.command_id, text=command.text)
+    return Step(state, (fact,), fact.model_dump(mode="json"))
+
+
+def _check_live(state: RecorderState) -> None:
+    if state.fact.state != "live":
+        raise Conflict(f"session {state.fact.session} has ended")

@@ -1,0 +1,332 @@
+"""The recorder's shell: what a worker does, and the MCAP files.
+
+It reads every owner, itself included. What it has written counts as read only once it is flushed to
+the disk, so that after a crash it reads again from there; what is then there twice is dropped when the
+segments are merged. A session ends when every service has read the end and all that the others put out
+before it; then the recording is finished and the end acknowledged.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import shutil
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import structlog
+from shift_runtime.journal import Batch
+from shift_runtime.reader import ReadFact
+from shift_runtime.settings import MeshSettings
+from shift_runtime.worker import Asked, Core, Worker, _Turn
+from shift_schemas.errors import ShiftError, Unavailable
+from shift_schemas.keys import READS
+from shift_schemas.messages import Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
+from shift_schemas.study_text import study_of
+
+from shift_recorder import core
+from shift_recorder.core import END_ID, FinishSession, RecorderState
+from shift_recorder.finishing import FinishedRecording, finish_recording
+from shift_recorder.mcap_schemas import recorded_json, subject_schemas
+from shift_recorder.parsing import Attachment
+from shift_recorder.reading import Recording
+from shift_recorder.segments import SegmentWriter, segments_of
+from shift_recorder.storage import StorageFailed
+from shift_recorder.studies import study_named
+
+log = structlog.get_logger()
+
+FLUSH_EVERY_S = 1.0
+END_WAIT_S = 3.5
+"""How long an end waits for the other services; below the doors' patience, so that they hear why."""
+LEAST_FREE_BYTES = 64 * 2**20
+"""No session starts with less room than this on the disk; chosen: an hour of 300 Hz gaze and its journals."""
+_PEERS = ("monitor", "decider", "learner")
+
+CORE: Core[RecorderState] = Core(
+    name="recorder",
+    step=core.step,
+    dump=core.dump,
+    load=core.load,
+    reads=READS["recorder"],
+)
+
+
+@lru_cache(maxsize=1)
+def software() -> tuple[str, str]:
+    """Version of shift-mesh and git revision, where known (``SHIFT_REVISION``)."""
+    try:
+        return version("shift-mesh"), os.environ.get("SHIFT_REVISION", "")
+    except PackageNotFoundError:
+        return "0", os.environ.get("SHIFT_REVISION", "")
+
+
+class RecorderWorker(Worker[RecorderState]):
+    """See the module."""
+
+    def __init__(self, *given: Any, settings: MeshSettings) -> None:
+        super().__init__(*given)
+        self.recordings = settings.data / "recordings"
+        self.segments = settings.data / "segments"
+        self.studies = settings.data / "studies"
+        self._writers: dict[str, SegmentWriter] = {}
+        self._unflushed: dict[tuple[str, str], int] = {}
+        self._ends: dict[str, list[Asked]] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    # --- life ---
+
+    async def on_start(self) -> None:
+        """Go on with ends that a crash interrupted, and flush from time to time."""
+        for session, closed in list(self.journal.sessions()):
+            state = None if closed else self._state(session)
+            if state is not None and state.fact.state == "ending":
+                self._begin_end(session)
+        self._later()
+
+    def _later(self) -> None:
+        asyncio.get_running_loop().call_later(FLUSH_EVERY_S, self._tick)
+
+    def _tick(self) -> None:
+        self.enqueue(self._flush)
+        self._later()
+
+    async def on_stop(self) -> None:
+        """Read what is left, and finish the files of the sessions that go on later."""
+        await self.reader.pull_all(self.reader.owners)
+        while self._queue:
+            await self._turn()
+        self._flush()
+        for session in list(self._writers):
+            await self._pause(session)
+
+    # --- commands ---
+
+    def prepare(self, message: Command | GazeChunk) -> Command | GazeChunk:
+        """A start gets its study, and is refused where there is no room for its recording."""
+        if not isinstance(message, StartSession):
+            return message
+        self._check_room()
+        study = message.study if isinstance(message.study, dict) else study_named(message.study, self.studies)
+        known, revision = software()
+        return message.model_copy(update={"study": study, "software": known, "revision": revision})
+
+    def _check_room(self) -> None:
+        try:
+            self.segments.mkdir(parents=True, exist_ok=True)
+            self.recordings.mkdir(parents=True, exist_ok=True)
+            free = shutil.disk_usage(self.recordings).free
+        except OSError as e:
+            raise Unavailable(f"the recorder cannot write to {self.recordings}: {e.strerror}") from e
+        if not os.access(self.segments, os.W_OK) or not os.access(self.recordings, os.W_OK):
+            raise Unavailable(f"the recorder must not write to {self.recordings}: the folder is read-only")
+        if free < LEAST_FREE_BYTES:
+            raise Unavailable(f"{self.recordings} has {free // 2**20} MB left; no session starts below 64 MB")
+
+    def _answer(self, turn: _Turn, asked: Asked) -> None:
+        if not isinstance(asked.message, EndSession) or isinstance(asked.message, FinishSession):
+            super()._answer(turn, asked)
+            return
+        state = self._state(asked.session)
+        if state is None or state.fact.state == "ended" or asked.message.command_id != END_ID:
+            super()._answer(turn, asked)
+            return
+        self._take(turn, asked.session, self.core.step(state, asked.message, self.clock.now()))
+        self._ends.setdefault(asked.session, []).append(asked)
+        if len(self._ends[asked.session]) == 1:
+            self._begin_end(asked.session)
+
+    # --- recording ---
+
+    def _apply(self, turn: _Turn, read: ReadFact) -> None:
+        session, key = read.fact.session, (read.fact.session, read.owner)
+        if read.seq != self.processed.get(key, 0) + 1:
+            return
+        state = self._state(session)
+        if state is None:
+            self.metrics.dropped("refused")
+            return
+        if state.fact.state == "ended":
+            if read.owner == "recorder" and read.fact.subject == "session" and read.seq == self.journal.heads[session]:
+                turn.ended.add(session)
+                self._tidy(session)
+            self.processed[key] = read.seq
+            return
+        try:
+            self._write(session, state, read.fact, read.seq)
+        except StorageFailed as e:
+            self._rewind(session, e)
+            return
+        self.processed[key] = self._unflushed[key] = read.seq
+        self.metrics.read(read.fact.subject)
+
+    def _write(self, session: str, state: RecorderState, fact: Fact, sequence: int) -> None:
+        if session not in self._writers:
+            schemas = subject_schemas(study_of(json.loads(state.config.study)))
+            self._writers[session] = SegmentWriter(self.segments, session, schemas)
+        now = self.clock.now().ns
+        self._writers[session].write(fact.subject, sequence, now, fact.stamp.ns, recorded_json(fact))
+
+    def _flush(self) -> None:
+        """Put what was written on the disk, and then count it as read."""
+        for session in {s for s, _ in self._unflushed}:
+            mine = {key: n for key, n in self._unflushed.items() if key[0] == session}
+            try:
+                if session in self._writers:
+                    self._writers[session].flush()
+                self.journal.commit(Batch(cursors=dict(mine)))
+            except Unavailable as e:
+                self._rewind(session, e)
+                continue
+            self._alarm = ""
+            for key in mine:
+                self._unflushed.pop(key, None)
+
+    def _rewind(self, session: str, error: Unavailable) -> None:
+        """The disk refused: go back to what is safe, and read the rest again later."""
+        if not self._alarm:
+            log.error("the recording cannot be written", session=session, error=error.detail)
+        self._alarm = error.detail
+        self.metrics.commit_failed()
+        writer = self._writers.pop(session, None)
+        if writer is not None:
+            writer.abandon()
+        committed = self.journal.cursors()
+        for owner in self.reader.owners:
+            self._unflushed.pop((session, owner), None)
+            self.reader.cursors[session, owner] = self.processed[session, owner] = committed.get((session, owner), 0)
+
+    # --- ending ---
+
+    def _begin_end(self, session: str) -> None:
+        task = asyncio.get_running_loop().create_task(self._end(session))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def _end(self, session: str) -> None:
+        try:
+            await self._converge(session)
+            state = self._state(session)
+            assert state is not None
+            self._write(session, state, core.ended(state, self.clock.now()), self.journal.heads[session] + 1)
+            self._flush()
+            finished = await asyncio.to_thread(self._finished, session, state)
+        except ShiftError as e:
+            log.warning("the session cannot end yet", session=session, error=e.detail)
+            for asked in self._ends.pop(session, []):
+                asked.refuse(e)
+            return
+        requests = [r for asked in self._ends.pop(session, []) for r in asked.requests]
+        message = FinishSession(
+            command_id=END_ID,
+            session=session,
+            recording=finished.path.name,
+            sha256=finished.sha256,
+            counts=finished.counts,
+        )
+        self.enqueue(Asked(session, "end_session", message, requests))
+        log.info("recording finished", session=session, file=str(finished.path), messages=sum(finished.counts.values()))
+
+    async def _converge(self, session: str) -> None:
+        """Read until every service has read the end and all that came before it."""
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + END_WAIT_S
+        while True:
+            silent = await self.reader.pull_all(("recorder", *_PEERS), session)
+            behind = silent or self._behind(session)
+            if not behind:
+                return
+            if loop.time() > deadline:
+                why = "does not answer" if silent else "has not caught up"
+                raise Unavailable(f"session {session} cannot end yet: the {behind[0]} {why}; ask again")
+            await asyncio.sleep(0.02)
+
+    def _behind(self, session: str) -> tuple[str, ...]:
+        pages = {owner: self.reader.pages[f"{owner}/{session}"] for owner in ("recorder", *_PEERS)}
+        own = {owner: self.processed.get((session, owner), 0) for owner in pages}
+        late = [owner for owner, page in pages.items() if own[owner] < page.heads.get(session, 0)]
+        return tuple(late) or tuple(p for p in _PEERS if _has_not_read(p, pages, session))
+
+    def _finished(self, session: str, state: RecorderState) -> FinishedRecording:
+        """Merge all there is of the session into its recording; in a thread, it takes its time."""
+        writer = self._writers.pop(session, None)
+        if writer is not None:
+            writer.finish()
+        target = self.recordings / f"{session}.mcap"
+        sources = [p for p in (target,) if p.exists()] + segments_of(self.segments, session)
+        policies = _first_and_last_policy(sources)
+        return finish_recording(
+            session,
+            sources,
+            target,
+            schemas=subject_schemas(study_of(json.loads(state.config.study)), _states_of(policies)),
+            metadata=_metadata(state),
+            attachments=_attachments(state, policies),
+        )
+
+    async def _pause(self, session: str) -> None:
+        """The process stops and the session lives on: leave a whole file of it so far."""
+        state = self._state(session)
+        if state is None:
+            return
+        try:
+            await asyncio.to_thread(self._finished, session, state)
+        except ShiftError as e:
+            log.error("the recording is left in segments", session=session, error=e.detail)
+            return
+        self._tidy(session)
+
+    def _tidy(self, session: str) -> None:
+        """Remove the segments that were merged."""
+        folder: Path = self.segments / session
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _has_not_read(peer: str, pages: dict[str, OutboxPage], session: str) -> bool:
+    cursors = pages[peer].cursors.get(session, {})
+    return any(cursors.get(owner, 0) < pages[owner].heads.get(session, 0) for owner in READS[peer])
+
+
+def _first_and_last_policy(sources: Iterable[Path]) -> tuple[bytes, bytes] | None:
+    found: tuple[bytes, bytes] | None = None
+    for source in sources:
+        for message in Recording(source).messages({"policy"}):
+            found = (found[0] if found else message.data, message.data)
+    return found
+
+
+def _states_of(policies: tuple[bytes, bytes] | None) -> tuple[str, ...]:
+    return tuple(json.loads(policies[0])["states"]) if policies else ()
+
+
+def _metadata(state: RecorderState) -> dict[str, dict[str, str]]:
+    fact = state.fact
+    ended = f"{fact.ended.sec}.{fact.ended.nsec:09d}" if fact.ended else ""
+    return {
+        "shift:session": {
+            "session": fact.session,
+            "participant": fact.participant,
+            "study": fact.study,
+            "condition": fact.condition or "",
+            "seed": str(fact.seed),
+            "started": f"{fact.started.sec}.{fact.started.nsec:09d}",
+            "ended": ended,
+            "replay_of": fact.replay_of,
+            "software": f"shift-mesh/{fact.software}",
+            "revision": fact.revision,
+        },
+        "shift:config": {"version": str(state.config.version), "study": state.config.study},
+    }
+
+
+def _attachments(state: RecorderState, policies: tuple[bytes, bytes] | None) -> list[Attachment]:
+    at = state.fact.started.ns
+    table = json.loads(state.config.study)["scoring"]["table"]
+    files = {"study.json": state.original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
+    if policies:
+        files |= {"policy-first.json": policies[0], "policy-last.json": policies[1]}
+    return [Attachment(name, "application/json", data, at) for name, data in files.items()]
