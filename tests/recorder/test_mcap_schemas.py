@@ -44,7 +44,14 @@ def nodes(node: Any) -> Any:
 
 def matches(value: Any, schema: dict[str, Any], at: str = "") -> None:
     """A naive validator for the few keywords that the schemas have."""
-    kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+    kinds: dict[str, Any] = {
+        "object": dict,
+        "array": list,
+        "string": str,
+        "boolean": bool,
+        "integer": int,
+        "number": (int, float),
+    }
     assert isinstance(value, kinds[schema["type"]]), at
     assert "enum" not in schema or value in schema["enum"], at
     if schema["type"] == "array":
@@ -105,7 +112,7 @@ def test_maps_list_the_names_that_the_study_gives(subject: str, path: str, names
 
 
 def test_known_names_stand_where_maps_are() -> None:
-    maps = set()
+    maps: set[str] = set()
     for subject in SUBJECTS:
         walk(SCHEMAS[subject], subject, maps)
     assert set(known_names(STUDY, STATES)) <= maps

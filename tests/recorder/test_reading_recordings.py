@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import subprocess
 import sys
 from pathlib import Path
 
-import lz4.frame
+import lz4.frame  # type: ignore[import-untyped]
 import pytest
 import zstandard
 from recorder_fixtures import (
     HEADER,
     MAGIC,
+    chunk,
     decision_fact,
     finished,
     honest_chunk,
@@ -199,8 +201,6 @@ def zeros(packer: object, total: int = 1_500_000_000) -> bytes:
 
 def bombs() -> dict[str, bytes]:
     """Recordings that claim or unpack to far more than they are."""
-    from recorder_fixtures import chunk
-
     packed = zeros(zstandard.ZstdCompressor(level=3).compressobj(size=1_500_000_000))
     assert len(packed) < 150_000
     wide = zstandard.ZstdCompressionParameters.from_level(1, window_log=30)
@@ -219,6 +219,8 @@ def bombs() -> dict[str, bytes]:
         "record longer than the file": b"\x06" + (2**40).to_bytes(8, "little"),
         "large metadata": record(12, b"\x01\0\0\0a" + (3 * 10**7).to_bytes(4, "little") + bytes(3 * 10**7)),
         "many attachments": record(9, bytes(16) + bytes(8) + (2**24).to_bytes(8, "little") + bytes(2**24 + 4)) * 9,
+        "dense metadata, then a large chunk": b"".join(dense_metadata(i) for i in range(4))
+        + chunk("zstd", zstandard.compress(bytes(32 * 2**20)), 32 * 2**20),
         "many schemas": b"".join(
             record(3, i.to_bytes(2, "little") + bytes(8) + (10**6).to_bytes(4, "little") + bytes(10**6))
             for i in range(1, 200)
@@ -226,9 +228,16 @@ def bombs() -> dict[str, bytes]:
     }
 
 
-def test_bombs_are_refused_below_256_mb_of_memory(tmp_path: Path) -> None:
-    import os
+def dense_metadata(number: int) -> bytes:
+    """The record that takes most memory for its size: a great many short texts."""
+    entries = b"".join(b"\3\0\0\0" + i.to_bytes(3, "little").translate(_ASCII) + bytes(4) for i in range(90_000))
+    return record(12, b"\4\0\0\0" + f"{number:04}".encode() + len(entries).to_bytes(4, "little") + entries)
 
+
+_ASCII = bytes(i % 128 for i in range(256))
+
+
+def test_bombs_are_refused_below_256_mb_of_memory(tmp_path: Path) -> None:
     here = str(Path(__file__).parent)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([here, *sys.path])}
     for name, body in bombs().items():

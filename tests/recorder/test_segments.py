@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 from recorder_fixtures import SCHEMAS, interleaved, write_segment
+from shift_recorder.parsing import Attachment
 from shift_recorder.reading import Recording
 from shift_recorder.segments import SegmentWriter, segments_of
-from shift_recorder.storage import StorageFailed
-from shift_recorder.writing import MAXIMUM_PAYLOAD
+from shift_recorder.storage import DurableFile, StorageFailed
+from shift_recorder.writing import MAXIMUM_PAYLOAD, RecordingWriter
 from shift_schemas.errors import MalformedMessage, TooLarge
 from shift_schemas.keys import SUBJECTS
 
@@ -80,6 +81,14 @@ def test_a_refused_message_leaves_the_segment_as_it_was(tmp_path: Path) -> None:
     recording = Recording(segment.path)
     assert [m.sequence for m in recording.messages()] == [1, 2]
     assert recording.report.complete
+
+
+def test_what_a_reader_would_refuse_is_not_written(tmp_path: Path) -> None:
+    writer = RecordingWriter(DurableFile(tmp_path / "s1.mcap", new=True), SCHEMAS, 1000)
+    with pytest.raises(TooLarge, match="metadata shift:config"):
+        writer.metadata("shift:config", {"study": "x" * 2**20})
+    with pytest.raises(TooLarge, match="attachment big"):
+        writer.attachment(Attachment("big", "", bytes(32 * 2**20), 0))
 
 
 def test_the_largest_message_that_is_taken_can_be_read(tmp_path: Path) -> None:

@@ -8,10 +8,7 @@ memory stays bounded whatever the file claims (RELIABILITY.md, rows 13-15).
 
 from __future__ import annotations
 
-import io
 import json
-import os
-import zlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -24,6 +21,7 @@ from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThin
 from shift_schemas.messages import FACTS, Fact
 
 from shift_recorder import parsing as p
+from shift_recorder.scanning import CutOff, Scan
 
 MAXIMUM_HELD = 4 * 2**20
 """Bytes of schemas, channels and metadata of one file that a reader keeps."""
@@ -64,10 +62,6 @@ class Report:
     reason: str = "it has not been read to its end"
     messages: int = 0
     bytes: int = 0
-
-
-class _CutOff(Exception):
-    """The file ends within what should be there."""
 
 
 class Recording:
@@ -127,17 +121,17 @@ class Recording:
     def located(self, topics: Collection[str] | None = None) -> Iterator[Located]:
         """As :meth:`messages`, with where each of them is."""
         self._clear()
-        scan: _Scan | None = None
+        scan: Scan | None = None
         try:
             with open(self.path, "rb") as stream:
-                scan = _Scan(stream)
+                scan = Scan(stream)
                 for offset, opcode, body in scan.records():
                     if opcode == p.CHUNK:
                         yield from self._chunk(offset, body, topics)
                     elif not scan.in_summary:
                         self._take_in(opcode, body)
             self.report = Report(True, reason="", messages=self._count, bytes=scan.good)
-        except _CutOff:
+        except CutOff:
             good = scan.good if scan else 0
             reason = f"it was not finished: it ends before its footer, {good} bytes of it can be read"
             self.report = Report(False, reason=reason, messages=self._count, bytes=good)
@@ -146,8 +140,8 @@ class Recording:
         except (DamagedRecording, OSError) as e:
             raise self._damaged(e, scan.good if scan else 0) from e
 
-    def _damaged(self, e: Exception, good: int) -> DamagedRecording:
-        why = e.detail if isinstance(e, DamagedRecording) else f"it cannot be read: {e}"
+    def _damaged(self, e: DamagedRecording | OSError, good: int) -> DamagedRecording:
+        why = e.detail if isinstance(e, DamagedRecording) else f"it cannot be read: {e.strerror}"
         self.report = Report(False, damaged=True, reason=why, messages=self._count, bytes=good)
         return DamagedRecording(f"{self.path.name}: after {good} bytes: {why}")
 
@@ -167,94 +161,45 @@ class Recording:
                 raise DamagedRecording(f"a record of kind {opcode} cannot stand in a chunk")
 
     def _take_in(self, opcode: int, body: memoryview) -> None:
-        if opcode == p.ATTACHMENT:
-            self._attached += len(body)
-            _bounded(self._attached, p.MAXIMUM_BYTES)
-            attachment = p.attachment_of(body)
-            self.attachments[attachment.name] = attachment
-            return
-        self._held += 0 if opcode in (p.MESSAGE_INDEX, p.DATA_END) else len(body)
-        _bounded(self._held, MAXIMUM_HELD)
         match opcode:
             case p.HEADER:
                 _, self.library = p.header_of(body)
             case p.SCHEMA:
                 schema = p.schema_of(body)
+                self._hold(0 if schema.id in self._schemas else len(body))
                 _same(self._schemas.setdefault(schema.id, schema), schema)
             case p.CHANNEL:
-                self._add_channel(p.channel_of(body))
+                self._add_channel(p.channel_of(body), len(body))
             case p.METADATA:
+                self._hold(len(body))
                 name, values = p.metadata_of(body)
                 self.metadata[name] = values
+            case p.ATTACHMENT:
+                self._attached += len(body)
+                _bounded(self._attached, p.MAXIMUM_BYTES)
+                attachment = p.attachment_of(body)
+                self.attachments[attachment.name] = attachment
             case p.MESSAGE_INDEX:
                 p.check_message_index(body)
 
-    def _add_channel(self, channel: p.ChannelRecord) -> None:
+    def _add_channel(self, channel: p.ChannelRecord, length: int) -> None:
+        self._hold(0 if channel.id in self._channels else length)
         _same(self._channels.setdefault(channel.id, channel), channel)
         if channel.schema_id:
             if channel.schema_id not in self._schemas:
                 raise DamagedRecording(f"channel {channel.id} has a schema that there is not")
             self.schemas[channel.topic] = self._schemas[channel.schema_id].data
 
-
-class _Scan:
-    """The records of a file, one after the other, with the checksums of its two sections."""
-
-    def __init__(self, stream: io.BufferedReader) -> None:
-        self._stream = stream
-        self._left = os.fstat(stream.fileno()).st_size
-        self._crc = 0
-        self.good = 0  # bytes up to here were right
-        self.in_summary = False
-
-    def records(self) -> Iterator[tuple[int, int, memoryview]]:
-        """Offset, kind and body of each record."""
-        self._magic()
-        yield self._record({p.HEADER})
-        while True:
-            record = self._record(p.SUMMARY_SECTION if self.in_summary else p.DATA_SECTION)
-            yield record
-            if record[1] == p.FOOTER:
-                break
-        self._magic()
-        if self._left:
-            raise DamagedRecording(f"{self._left} bytes follow its end")
-
-    def _record(self, allowed: set[int]) -> tuple[int, int, memoryview]:
-        offset, crc = self.good, self._crc
-        head = self._take(p.HEAD.size)
-        opcode, length = p.HEAD.unpack(head)
-        p.check_head(opcode, length, allowed)
-        body = memoryview(self._take(length))
-        if opcode == p.DATA_END:
-            _check_section("data", crc, int.from_bytes(body, "little"))
-            self._crc, self.in_summary = 0, True
-        elif opcode == p.FOOTER:
-            _check_section("summary", zlib.crc32(head + body[:16], crc), int.from_bytes(body[16:], "little"))
-        self.good = offset + len(head) + length
-        return offset, opcode, body
-
-    def _take(self, n: int) -> bytes:
-        if n > self._left:
-            raise _CutOff
-        data = self._stream.read(n)
-        if len(data) != n:
-            raise _CutOff
-        self._left -= n
-        self._crc = zlib.crc32(data, self._crc)
-        return data
-
-    def _magic(self) -> None:
-        there = min(len(p.MAGIC), self._left)
-        if self._take(there) != p.MAGIC[:there]:
-            raise DamagedRecording("this is not the beginning or end of an MCAP file")
-        if there < len(p.MAGIC):
-            raise _CutOff
-        self.good += there
+    def _hold(self, length: int) -> None:
+        self._held += length
+        _bounded(self._held, MAXIMUM_HELD)
 
 
 def facts(path: Path) -> Iterator[RecordedFact]:
-    """The facts of the recording at ``path``, in its order; see :meth:`Recording.facts`."""
+    """The facts of the recording at ``path``, in its order; see :meth:`Recording.facts`.
+
+    Of a file that is cut off these just end; where that matters, ask the :class:`Recording`.
+    """
     return Recording(path).facts()
 
 
@@ -305,8 +250,3 @@ def _bounded(held: int, most: int) -> None:
 def _same(one: object, other: object) -> None:
     if one != other:
         raise DamagedRecording("it gives the same schema or channel twice, and differently")
-
-
-def _check_section(what: str, found: int, crc: int) -> None:
-    if crc and crc != found:
-        raise DamagedRecording(f"the checksum of its {what} section is {crc:08x} and should be {found:08x}")

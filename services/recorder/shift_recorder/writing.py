@@ -15,7 +15,7 @@ from shift_schemas.errors import MalformedMessage, TooLarge, shorten
 from shift_schemas.keys import SUBJECTS
 
 from shift_recorder.mcap_schemas import schema_name
-from shift_recorder.parsing import Attachment
+from shift_recorder.parsing import MAXIMUM_BYTES, MAXIMUM_SMALL_BYTES, Attachment
 from shift_recorder.storage import DurableFile
 
 MAXIMUM_PAYLOAD = 8 * 2**20
@@ -79,18 +79,20 @@ class RecordingWriter:
             raise MalformedMessage(f"{shorten(subject)!r} is none of {', '.join(self._channels)}")
         if sequence < 0 or not (0 <= log_time < 2**64 and 0 <= publish_time < 2**64):
             raise MalformedMessage(f"{subject} {sequence}: sequence and times must be 0 or more")
-        if len(data) > MAXIMUM_PAYLOAD:
-            raise TooLarge(f"{subject} {sequence} has {len(data)} bytes; at most {MAXIMUM_PAYLOAD} are recorded")
+        _readable(f"{subject} {sequence}", len(data), MAXIMUM_PAYLOAD)
         self._writer.add_message(
             channel, log_time=log_time, data=data, publish_time=publish_time, sequence=sequence & 0xFFFFFFFF
         )
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """A metadata record."""
+        """A metadata record. Raises :class:`TooLarge` above what a reader takes."""
+        size = sum(len(f"{key}{value}".encode()) + 8 for key, value in values.items()) + len(name) + 8
+        _readable(f"metadata {name}", size, MAXIMUM_SMALL_BYTES)
         self._writer.add_metadata(name, dict(values))
 
     def attachment(self, a: Attachment) -> None:
-        """An attachment."""
+        """An attachment. Raises :class:`TooLarge` above what a reader takes."""
+        _readable(f"attachment {a.name}", len(a.data) + 1024, MAXIMUM_BYTES)
         self._writer.add_attachment(a.log_time, a.log_time, a.name, a.media_type, a.data)
 
     def close_chunk(self) -> None:
@@ -100,3 +102,8 @@ class RecordingWriter:
     def finish(self) -> None:
         """Writes the last chunk, the indexes, the statistics and the footer."""
         self._writer.finish()
+
+
+def _readable(what: str, size: int, most: int) -> None:
+    if size > most:
+        raise TooLarge(f"{what} has {size} bytes; at most {most} are recorded")
