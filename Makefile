@@ -57,7 +57,7 @@ lock: | $(UV)                           ## Make requirements*.lock anew; LOCK_AR
 	    --no-annotate --custom-compile-command "make lock" $(LOCK_ARGS) \
 	    --constraints requirements-dev.lock --group pyproject.toml:build --output-file requirements-build.lock
 
-build/uv/bin/uv: | $(VENV)
+build/uv/bin/uv: | $(BIN)/pip
 	@$(BIN)/python -m venv build/uv
 	@build/uv/bin/python -m pip --quiet --disable-pip-version-check install uv
 
@@ -67,7 +67,7 @@ clean:                                  ## Take away .venv, caches and builds; r
 
 # --- what `setup` is made of; a stamp file is newer than what it was made from ---
 
-$(VENV):
+$(BIN)/pip:
 	@set -e; found=; \
 	for python in $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python); do \
 	    if "$$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
@@ -85,7 +85,7 @@ $(VENV):
 	echo "Making $(VENV) with $$("$$found" --version)."; \
 	"$$found" -m venv $(VENV)
 
-$(VENV)/.locked: requirements.lock requirements-build.lock | $(VENV)
+$(VENV)/.locked: requirements.lock requirements-build.lock | $(BIN)/pip
 	@$(PIP) install --require-hashes --no-deps -r requirements.lock -r requirements-build.lock
 	@touch $@
 
