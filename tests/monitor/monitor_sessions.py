@@ -36,9 +36,7 @@ def study(**parts: Any) -> Study:
 
 
 def session(state: str = "live") -> Session:
-    return Session(
-        session="s1", stamp=NOW, participant="P01", study="test", seed=7, state=state, started=NOW
-    )  # type: ignore[arg-type]
+    return Session(session="s1", stamp=NOW, participant="P01", study="test", seed=7, state=state, started=NOW)  # type: ignore[arg-type]
 
 
 def config(of: Study, version: int = 1) -> Config:

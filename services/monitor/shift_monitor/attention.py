@@ -7,7 +7,7 @@ Targets are indices of the study's AOIs, ``NOWHERE`` is none of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from shift_schemas.stamps import NS
 from shift_schemas.study import AttentionSettings
@@ -22,8 +22,7 @@ TOTAL = 1.0
 """What the weights sum to, the paper's C_max; chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class Attention:
+class Attention(NamedTuple):
     """What gaze has left behind."""
 
     weights: tuple[float, ...]
@@ -41,8 +40,7 @@ class Attention:
     """Whether a valid sample fell on an AOI yet."""
 
 
-@dataclass(frozen=True, slots=True)
-class Dwell:
+class Dwell(NamedTuple):
     """Gaze on one target from ``start_ns`` on for ``duration_ns``."""
 
     target: int

@@ -7,8 +7,7 @@ next one, at most ``maximum_gap_s``. Time for which no valid sample stands is a 
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from math import atan, degrees
 from typing import NamedTuple
 
 from shift_schemas.stamps import NS
@@ -32,8 +31,7 @@ class Rule(NamedTuple):
     height: float
 
 
-@dataclass(frozen=True, slots=True)
-class Open:
+class Open(NamedTuple):
     """A fixation that goes on."""
 
     start_ns: int
@@ -47,8 +45,7 @@ class Open:
     bottom: float
 
 
-@dataclass(frozen=True, slots=True)
-class Detector:
+class Detector(NamedTuple):
     """What the detector remembers from one sample to the next."""
 
     last_ns: int | None = None
@@ -123,9 +120,9 @@ def dispersion_deg(left: float, right: float, top: float, bottom: float, rule: R
     A point's angle on an axis is ``atan((p - 0.5) * size / distance)``: an eye straight before the
     middle of the screen.
     """
-    horizontal = math.atan((right - 0.5) * rule.width) - math.atan((left - 0.5) * rule.width)
-    vertical = math.atan((bottom - 0.5) * rule.height) - math.atan((top - 0.5) * rule.height)
-    return math.degrees(horizontal + vertical)
+    horizontal = atan((right - 0.5) * rule.width) - atan((left - 0.5) * rule.width)
+    vertical = atan((bottom - 0.5) * rule.height) - atan((top - 0.5) * rule.height)
+    return degrees(horizontal + vertical)
 
 
 def _ended(filter: Filter, candidate: tuple[Point, ...], open_: Open | None, rule: Rule, output: Output) -> None:

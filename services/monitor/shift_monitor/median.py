@@ -8,7 +8,7 @@ edges of saccades; Juhola 1985, Comput. Biol. Med. 15(2), 73-84.)
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 Point = tuple[int, float, float, int]
 """A gaze sample: t_ns on the source's clock, x and y 0..1, and for how long it stands, ns."""
@@ -17,8 +17,7 @@ LONGEST_WINDOW = 256
 """Chosen: samples that are kept at most, 30 ms at 8 kHz; a faster one comes out early instead."""
 
 
-@dataclass(frozen=True, slots=True)
-class Filter:
+class Filter(NamedTuple):
     """The samples within reach, of which the last ``waiting`` have not come out yet."""
 
     points: tuple[Point, ...] = ()
@@ -57,7 +56,12 @@ def flushed(filter: Filter, half_ns: int) -> list[Point]:
 
 def _filtered(points: tuple[Point, ...], i: int, half_ns: int) -> Point:
     t_ns, _, _, duration_ns = points[i]
-    around = [p for p in points if -half_ns <= p[0] - t_ns <= half_ns]
+    first, end = 0, len(points)
+    while points[first][0] < t_ns - half_ns:
+        first += 1
+    while points[end - 1][0] > t_ns + half_ns:
+        end -= 1
+    around = points[first:end]
     return t_ns, _median([p[1] for p in around]), _median([p[2] for p in around]), duration_ns
 
 

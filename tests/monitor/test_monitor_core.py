@@ -1,0 +1,397 @@
+"""The monitor's fold: what it takes, what it refuses, and that its outputs can be derived again."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from monitor_sessions import (
+    NEGATION,
+    NOW,
+    RECORDINGS,
+    began,
+    config,
+    decision,
+    fixations,
+    fold,
+    last,
+    names,
+    performance,
+    played,
+    points,
+    recording,
+    session,
+    study,
+)
+from shift_cli.gaze_files import Sample, chunks
+from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
+from shift_schemas.errors import Conflict, MalformedMessage, Unavailable, UnknownThing
+from shift_schemas.messages import (
+    Config,
+    Decision,
+    Fact,
+    Gaze,
+    GazeChunk,
+    Marker,
+    Message,
+    Observation,
+    Performance,
+    Session,
+)
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import NotYet
+
+REAL = recording(RECORDINGS[2])  # the one with the most loss
+
+
+# --- independence of chunking ---
+
+
+@settings(max_examples=25, deadline=None)
+@given(cuts=st.lists(st.integers(1, 80), min_size=1, max_size=40), start=st.integers(0, len(REAL) - 300))
+def test_any_cut_of_the_same_samples_leaves_the_same_bit_for_bit(cuts: list[int], start: int) -> None:
+    taken = REAL[start : start + 300]
+    whole, facts = played(taken, 300)
+    parts, seq, at = [], 0, 0
+    while at < len(taken):
+        n = cuts[seq % len(cuts)]
+        (chunk,) = chunks(taken[at : at + n], n)
+        parts.append(chunk.model_copy(update={"seq": seq}))
+        seq, at = seq + 1, at + n
+    cut, cut_facts = fold(began(), *parts, session("ending"))
+    assert cut.attention == whole.attention
+    assert spans(cut_facts) == spans(facts)
+    assert last(cut_facts).gaze == last(facts).gaze
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    gaze=st.lists(st.tuples(st.integers(1, 1500), st.sampled_from(["left", "right", None])), min_size=2, max_size=40),
+    n=st.integers(1, 10),
+)
+def test_any_cut_of_the_same_names_leaves_the_same_bit_for_bit(gaze: list[tuple[int, str | None]], n: int) -> None:
+    t, now = [], 0.0
+    for wait_ms, _ in gaze:
+        now += wait_ms / 1000
+        t.append(now)
+    aoi = [name for _, name in gaze]
+    whole, _ = fold(began(), names(0, t, aoi))
+    cut, _ = fold(began(), *(names(seq, t[i : i + n], aoi[i : i + n]) for seq, i in enumerate(range(0, len(t), n))))
+    assert cut.attention == whole.attention
+
+
+def spans(facts: list[Fact]) -> list[tuple[float, float, float, float, str]]:
+    return [(f.start_s, f.duration_s, f.x, f.y, f.aoi) for f in fixations(facts)]
+
+
+# --- a session as it happens, and derived again ---
+
+
+def a_session(seed: int) -> list[Message]:
+    """Real gaze with decisions, results, a new configuration, a source change, gaps, repeats and a late chunk."""
+    rng = random.Random(seed)
+    gaze: list[GazeChunk] = list(chunks(REAL[:500], 10, "tx300"))
+    late = gaze.pop(7)
+    gaze.insert(9, late)
+    del gaze[20:22]
+    gaze.insert(30, gaze[29])
+    gaze += [names(3 + i, [i / 4], [rng.choice(["left", "right", None])]) for i in range(12)]
+    events: list[Message] = []
+    n = 0
+    for i, chunk in enumerate(gaze):
+        events.append(chunk)
+        if rng.random() < 0.3:
+            n += 1
+            events.append(decision(n, rng.choice([NEGATION, {"negation": "affirmation", "hesitation": "none"}])))
+            events.append(performance(n, rng.random() < 0.5, rng.random() < 0.5, rng.choice(["grasp", "pour"])))
+        if i == 25:
+            events.append(config(study(attention={"weight_step": 0.03}, awareness={"window": 4}), version=2))
+    return [session(), config(study()), *events, session("ending")]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_state_that_was_written_and_read_again_goes_on_identically(seed: int) -> None:
+    rng = random.Random(seed)
+    state: MonitorState | None = None
+    other: MonitorState | None = None
+    for event in a_session(seed):
+        done, again = step(state, event, NOW), step(other, event, NOW)
+        assert again == done
+        state = done.state
+        other = load(dump(state)) if rng.random() < 0.5 else again.state
+        assert other == state
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_outputs_tell_their_inputs_and_fold_to_themselves(seed: int) -> None:
+    """What ``verify`` does: recorded gaze, decisions, results and configurations, in the order that `seen` tells."""
+    events = a_session(seed)
+    _, facts = fold(None, *events)
+    decisions = {e.n: e for e in events if isinstance(e, Decision)}
+    results = {e.n: e for e in events if isinstance(e, Performance)}
+    configs = {e.version: e for e in events if isinstance(e, Config)}
+    inputs: list[Message] = [session()]
+    before = (0, 0, 0)
+    pending: list[Gaze] = []
+    for fact in facts:
+        if isinstance(fact, Gaze):
+            pending.append(fact)
+        if not isinstance(fact, Observation):
+            continue
+        seen = (fact.seen.decision, fact.seen.performance, fact.seen.config)
+        if pending:
+            inputs.append(gaze_chunk_of(pending.pop()))
+        elif seen[0] != before[0]:
+            inputs.append(decisions[seen[0]])
+        elif seen[1] != before[1]:
+            inputs.append(results[seen[1]])
+        elif seen[2] != before[2]:
+            inputs.append(configs[seen[2]])
+        else:
+            inputs.append(session("ending"))
+        before = seen
+    _, again = fold(None, *inputs)
+    assert [f.model_dump_json() for f in again] == [f.model_dump_json() for f in facts]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_applied_input_ends_in_one_observation_of_the_next_version(seed: int) -> None:
+    state, version = None, 0
+    for event in a_session(seed):
+        done = step(state, event, NOW)
+        state = done.state
+        found = [f for f in done.facts if isinstance(f, Observation)]
+        if done.facts:
+            version += 1
+            assert [f.version for f in found] == [version]
+            assert done.facts[-1] is found[0]
+            assert all(f.seen == found[0].seen for f in done.facts)
+        assert state.version == version
+
+
+def test_facts_carry_the_stamp_that_was_handed_in() -> None:
+    stamp = Stamp(sec=5, nsec=6)
+    done = step(began(), names(0, [0.0], ["left"]), stamp)
+    assert {f.stamp for f in done.facts} == {stamp}
+
+
+# --- sessions and configurations ---
+
+
+def test_the_first_observation_is_that_of_the_first_configuration() -> None:
+    state, facts = fold(None, session())
+    assert facts == []
+    assert state == initial(session())
+    _, facts = fold(state, config(study(capacity={"start": 0.4})))
+    observation = last(facts)
+    assert observation.version == 1
+    assert (observation.capacity.value, observation.capacity.category) == (0.4, "low")
+    assert observation.gaze.category == "uncertain"
+    assert set(observation.gaze.weights.values()) == {1 / 3}
+    assert observation.awareness == {}
+    assert observation.seen.config == 1
+
+
+def test_a_later_configuration_changes_settings_and_keeps_the_partner() -> None:
+    state, _ = fold(began(), decision(1), names(0, [0.0, 0.2], ["left", "left"]))
+    after, facts = fold(state, config(study(capacity={"threshold": 0.95}), version=2))
+    assert after.attention == state.attention
+    assert last(facts).capacity.value == pytest.approx(0.9)
+    assert last(facts).capacity.category == "low"
+
+
+def test_without_a_session_nothing_is_known() -> None:
+    for event in (config(study()), names(0, [0.0], ["left"]), decision(1)):
+        with pytest.raises(UnknownThing):
+            step(None, event, NOW)
+
+
+@pytest.mark.parametrize("event", [names(0, [0.0], ["left"]), decision(1), performance(1, True, True)])
+def test_before_its_configuration_a_session_has_others_wait(event: Message) -> None:
+    state, _ = fold(None, session())
+    with pytest.raises(NotYet):
+        step(state, event, NOW)
+    with pytest.raises(Unavailable):
+        step(state, event, NOW, late=True)
+
+
+def test_what_is_not_the_monitors_leaves_no_trace() -> None:
+    state = began()
+    done = step(state, Marker(session="s1", stamp=NOW, marker_id="m1", text="hm"), NOW)
+    assert (done.state, done.facts) == (state, ())
+    assert step(state, session(), NOW).facts == ()
+
+
+def test_a_session_that_ends_ends_its_open_fixation_and_takes_no_more_gaze() -> None:
+    t = [i / 100 for i in range(50)]
+    state, facts = fold(began(), points(0, t, [0.5] * 50), session("ending"))
+    assert len(fixations(facts)) == 1
+    assert fold(state, session("ended"))[1] == []
+    with pytest.raises(Conflict, match="has ended"):
+        step(state, points(1, [1.0], [0.5]), NOW)
+
+
+def test_a_session_that_ends_before_its_configuration_just_ends() -> None:
+    state, facts = fold(None, session(), session("ending"))
+    assert (state.ended, facts) == (True, [])
+
+
+# --- gaze: what is recorded ---
+
+
+def test_gaze_is_recorded_as_it_was_applied() -> None:
+    chunk = GazeChunk(
+        source="a", seq=0, t=[0.0, 0.1, 0.2], x=[0.1, None, 0.3], y=[0.2, 0.9, 0.4], valid=[True, False, False]
+    )
+    state, facts = fold(began(), chunk)
+    gaze = facts[0]
+    assert isinstance(gaze, Gaze)
+    assert (gaze.x, gaze.y, gaze.valid) == ([0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [True, False, False])
+    assert gaze.aoi == []
+    assert fold(began(), gaze_chunk_of(gaze)) == (state, facts)
+
+
+def test_no_aoi_is_recorded_as_an_empty_name() -> None:
+    state, facts = fold(began(), names(0, [0.0, 0.1], ["left", None]))
+    gaze = facts[0]
+    assert isinstance(gaze, Gaze)
+    assert (gaze.aoi, gaze.x, gaze.valid) == (["left", ""], [], [])
+    assert fold(began(), gaze_chunk_of(gaze)) == (state, facts)
+
+
+def test_left_out_valid_is_where_x_and_y_are() -> None:
+    _, facts = fold(began(), GazeChunk(source="a", seq=0, t=[0.0, 0.1], x=[0.1, 0.2], y=[0.2, None]))
+    assert isinstance(facts[0], Gaze)
+    assert facts[0].valid == [True, False]
+
+
+def test_gaze_is_uncertain_before_the_first_valid_sample_on_an_aoi() -> None:
+    one = study(aois=[{"name": "cup", "rectangle": [0.0, 0.0, 0.5, 1.0]}])
+    state, facts = fold(began(one), points(0, [0.0, 0.01], [None, 0.9]))
+    assert last(facts).gaze.category == "uncertain"
+    _, facts = fold(state, points(1, [0.02], [0.2]))
+    assert last(facts).gaze.category == "focused"
+
+
+# --- gaze: numbers, sources, clocks ---
+
+
+def test_a_repeat_is_answered_alike_and_ignored() -> None:
+    chunk = names(0, [0.0, 0.1], ["left", "left"])
+    first = step(began(), chunk, NOW)
+    again = step(first.state, chunk, NOW)
+    assert (again.state, again.facts) == (first.state, ())
+    assert again.result == first.result == {"accepted": 2, "source": "ros", "seq": 0}
+
+
+def test_a_gap_is_counted() -> None:
+    state, facts = fold(began(), names(2, [0.0], ["left"]))
+    assert last(facts).gaze.dropped == 2
+    _, facts = fold(state, names(6, [0.1], ["left"]))
+    assert last(facts).gaze.dropped == 5
+    assert last(facts).seen.gaze == {"ros": 6}
+
+
+def test_a_late_chunk_is_recorded_and_not_applied_and_its_repeat_ignored() -> None:
+    state, before = fold(began(), names(0, [0.0], ["left"]), names(3, [0.3], ["left"]))
+    done = step(state, names(1, [0.1], ["right"]), NOW)
+    gaze, observation = done.facts
+    assert isinstance(gaze, Gaze)
+    assert isinstance(observation, Observation)
+    assert gaze.outcome == "late"
+    assert observation.gaze == last(before).gaze
+    assert observation.seen.gaze == {"ros": 3}
+    assert done.result == {"accepted": 0, "source": "ros", "seq": 1}
+    assert step(done.state, names(1, [0.1], ["right"]), NOW).facts == ()
+    assert len(step(done.state, names(2, [0.2], ["right"]), NOW).facts) == 2
+
+
+def test_many_gaps_are_remembered_up_to_a_bound() -> None:
+    state = began()
+    for n in range(200):
+        state, _ = fold(state, names(2 * n + 1, [float(n)], ["left"]))
+    assert state.stream is not None
+    assert len(state.stream.numbering.gaps) == 64
+    assert state.dropped == 200
+
+
+def test_a_source_that_begins_to_speak_takes_over() -> None:
+    t = [i / 100 for i in range(50)]
+    state, _ = fold(began(), points(4, [100 + s for s in t], [0.2] * 50, source="old"))
+    state, facts = fold(state, names(0, [0.0], ["right"], source="new"))
+    assert [type(f).__name__ for f in facts] == ["Gaze", "Fixation", "Observation"]
+    assert [f.source for f in fixations(facts)] == ["old"]
+    assert last(facts).seen.gaze == {"old": 4, "new": 0}
+    with pytest.raises(Conflict, match="replaced by new"):
+        step(state, points(5, [101.0], [0.2], source="old"), NOW)
+
+
+def test_a_source_can_change_from_points_to_names() -> None:
+    state, _ = fold(began(), points(0, [i / 100 for i in range(50)], [0.2] * 50, source="a"))
+    state, facts = fold(state, names(1, [0.5, 0.7], ["right", "right"], source="a"))
+    assert len(fixations(facts)) == 1
+    assert last(facts).gaze.aoi == "right"
+    _, facts = fold(state, points(2, [0.8], [0.2], source="a"))
+    assert last(facts).gaze.dropped == 0
+
+
+def test_a_time_that_does_not_rise_is_refused_and_changes_nothing() -> None:
+    state, _ = fold(began(), names(0, [0.0, 0.5], ["left", "left"]))
+    with pytest.raises(MalformedMessage) as refused:
+        step(state, names(1, [0.5], ["left"]), NOW)
+    assert refused.value.errors[0].field == "t"
+    with pytest.raises(MalformedMessage):
+        step(state, names(1, [0.6, 0.6 + 1e-11], ["left", "left"]), NOW)
+
+
+def test_an_unknown_aoi_is_refused_with_the_names_that_the_study_has() -> None:
+    with pytest.raises(MalformedMessage) as refused:
+        step(began(), names(0, [0.0, 0.1], ["left", "cup"]), NOW)
+    (error,) = refused.value.errors
+    assert (error.field, error.value) == ("aoi.1", "cup")
+    assert "left, middle, right" in error.rule
+
+
+def test_a_point_off_the_screen_is_gaze_and_one_off_the_earth_is_not() -> None:
+    _, facts = fold(began(), points(0, [0.0], [1.2]))
+    assert last(facts).gaze.category == "uncertain"
+    with pytest.raises(MalformedMessage):
+        step(began(), points(0, [0.0], [1e300]), NOW)
+
+
+def test_the_longest_times_and_numbers_that_a_chunk_can_carry_are_taken() -> None:
+    state, _ = fold(began(), names(0, [-1e11], ["left"]), names(2**53, [1e11], ["right"]))
+    state, facts = fold(state, points(2**53, [i / 100 - 1e9 for i in range(30)], [0.5] * 30), session("ending"))
+    assert last(facts).gaze.dropped == 2**53
+    assert load(dump(state)) == state
+
+
+samples = st.tuples(
+    st.floats(0.0001, 0.2), st.one_of(st.none(), st.floats(-0.5, 1.5)), st.floats(-0.5, 1.5), st.booleans()
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(samples, min_size=1, max_size=80), st.integers(1, 9))
+def test_no_gaze_brings_the_model_out_of_its_bounds(
+    gaze: list[tuple[float, float | None, float, bool]], n: int
+) -> None:
+    t, taken = 0.0, []
+    for wait, x, y, valid in gaze:
+        t += wait
+        taken.append(Sample(t, x, y, valid and x is not None))
+    state, facts = played(taken, n)
+    for fact in facts:
+        if isinstance(fact, Observation):
+            assert sum(fact.gaze.weights.values()) == pytest.approx(1.0, abs=1e-12)
+            assert min(fact.gaze.weights.values()) >= 0.0
+            assert 0.0 <= fact.gaze.focus_shift <= 1.0
+    assert len(fixations(facts)) == last(facts).gaze.fixations
+    assert load(dump(state)) == state
+
+
+def test_session_is_the_only_event_that_begins_one() -> None:
+    assert isinstance(session(), Session)
+    assert step(None, session(), NOW).state == initial(session())
