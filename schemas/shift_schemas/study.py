@@ -212,7 +212,7 @@ class ScoringSettings(_Part):
     """The scoring system (paper, section III-C). Parts that are left out stay as the default has them.
 
     A strategy set to null is taken out; one more is a strategy more, and a column more in the table.
-    The actions follow the strategies as listed where the default ones are all named, else the default's order.
+    The actions follow the strategies as listed where the default ones are all named, else as here.
     """
 
     strategies: dict[Level, StrategySettings] = Field(min_length=1, max_length=6)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import difflib
 import json
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import yaml
@@ -86,6 +87,12 @@ def study_data(study: Study) -> dict[str, Any]:
 def study_json(study: Study) -> str:
     """The study as one JSON string, as ``config`` facts carry it."""
     return json.dumps(study_data(study), ensure_ascii=False, separators=(",", ":"))
+
+
+@lru_cache(maxsize=128)
+def study_from_json(text: str) -> Study:
+    """The inverse of :func:`study_json`, remembered: a study in force is read at every message of its session."""
+    return study_of(json.loads(text))
 
 
 def _in_force(study: Study, condition: str, name: str, lines: Lines) -> Study:

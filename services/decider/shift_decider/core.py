@@ -8,9 +8,7 @@ within ``wait_s`` it is made with what is there, and says so.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 from pydantic import TypeAdapter
@@ -37,7 +35,7 @@ from shift_schemas.scoring import Reduction, reduce, view
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import NotYet, Step, covers, merged_seen
 from shift_schemas.study import Study
-from shift_schemas.study_text import study_of
+from shift_schemas.study_text import study_from_json
 from shift_schemas.words import PolicySource, Triple
 
 ANY_TASK = ""
@@ -70,11 +68,6 @@ def dump(state: DeciderState) -> str:
 def load(text: str) -> DeciderState:
     """The state that :func:`dump` wrote."""
     return _STATE.validate_json(text)
-
-
-@lru_cache(maxsize=64)
-def _parsed(study: str) -> Study:
-    return study_of(json.loads(study))
 
 
 def step(state: DeciderState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[DeciderState]:
@@ -114,7 +107,7 @@ def _estimated(state: DeciderState, now: Stamp) -> Step[DeciderState]:
     """Put out an estimate for each task whose scores or cognitive state changed."""
     if state.config is None or state.observation is None:
         return Step(state)
-    study = _parsed(state.config.study)
+    study = study_from_json(state.config.study)
     tasks = list(study.tasks) if study.tasks is not None else [ANY_TASK, *state.observation.awareness]
     known = dict(state.estimates)
     facts = []
@@ -295,7 +288,7 @@ def _check_live(state: DeciderState) -> None:
 
 def _study(state: DeciderState, missing: Lacks, late: bool) -> Study:
     if missing.config and not late:
-        raise NotYet(("recorder",), _parsed(state.config.study).decider.wait_s if state.config else 2.0)
+        raise NotYet(("recorder",), study_from_json(state.config.study).decider.wait_s if state.config else 2.0)
     if state.config is None:
         raise Unavailable("the recorder has put out no configuration of this session yet")
-    return _parsed(state.config.study)
+    return study_from_json(state.config.study)

@@ -1,0 +1,1 @@
+"""The gateway: the door for REST, the live stream and the web page."""

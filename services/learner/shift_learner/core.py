@@ -8,7 +8,6 @@ a discount above 0 the transition waits for the next decision, or for the sessio
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -32,7 +31,7 @@ from shift_schemas.messages import (
 )
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import NotYet, Step
-from shift_schemas.study_text import study_of
+from shift_schemas.study_text import study_from_json
 from shift_schemas.words import Triple
 
 from shift_learner.learner import Context, Learner, Taken, state_names, state_of
@@ -90,7 +89,7 @@ def load(text: str) -> LearnerState:
 @lru_cache(maxsize=64)
 def context_of(study: str) -> Context:
     """The context of a study in force, given as ``config`` facts carry it."""
-    return Context(study_of(json.loads(study)))
+    return Context(study_from_json(study))
 
 
 def step(state: LearnerState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[LearnerState]:

@@ -17,7 +17,7 @@ from shift_schemas.messages import Command, Config, Configure, EndSession, Fact,
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import Step
 from shift_schemas.study import Study, fixed_changes
-from shift_schemas.study_text import patched, study_data, study_in_force, study_json, study_of
+from shift_schemas.study_text import patched, study_data, study_from_json, study_in_force, study_json, study_of
 
 START_ID = "start"
 END_ID = "end"
@@ -137,7 +137,7 @@ def _finish(state: RecorderState, command: FinishSession, now: Stamp) -> Step[Re
 
 def _configure(state: RecorderState, command: Configure, now: Stamp) -> Step[RecorderState]:
     _check_live(state)
-    before = study_of(json.loads(state.config.study))
+    before = study_from_json(state.config.study)
     after = patched(before, command.patch)
     check_changeable(before, after)
     config = Config(session=command.session, stamp=now, version=state.config.version + 1, study=study_json(after))

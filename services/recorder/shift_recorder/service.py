@@ -26,7 +26,7 @@ from shift_runtime.worker import Asked, Core, Worker, _Turn
 from shift_schemas.errors import ShiftError, Unavailable
 from shift_schemas.keys import READS
 from shift_schemas.messages import Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
-from shift_schemas.study_text import study_of
+from shift_schemas.study_text import study_from_json
 
 from shift_recorder import core
 from shift_recorder.core import END_ID, FinishSession, RecorderState
@@ -166,7 +166,7 @@ class RecorderWorker(Worker[RecorderState]):
 
     def _write(self, session: str, state: RecorderState, fact: Fact, sequence: int) -> None:
         if session not in self._writers:
-            schemas = subject_schemas(study_of(json.loads(state.config.study)))
+            schemas = subject_schemas(study_from_json(state.config.study))
             self._writers[session] = SegmentWriter(self.segments, session, schemas)
         now = self.clock.now().ns
         self._writers[session].write(fact.subject, sequence, now, fact.stamp.ns, recorded_json(fact))
@@ -263,7 +263,7 @@ class RecorderWorker(Worker[RecorderState]):
             session,
             sources,
             target,
-            schemas=subject_schemas(study_of(json.loads(state.config.study)), _states_of(policies)),
+            schemas=subject_schemas(study_from_json(state.config.study), _states_of(policies)),
             metadata=_metadata(state),
             attachments=_attachments(state, policies),
         )

@@ -1,0 +1,365 @@
+"""The REST paths (INTERFACE.md, "REST"): HTTP around the door, in the order ids, session, body."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Query, Request, Response, WebSocket, WebSocketDisconnect
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, StreamingResponse
+from pydantic import BaseModel
+from shift_runtime.bus import Bus
+from shift_runtime.clock import Clock
+from shift_runtime.mesh_client import MeshClient
+from shift_runtime.metrics import Metrics
+from shift_schemas.codec import encode
+from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, UnknownThing
+from shift_schemas.keys import OWNERS, ServiceKey, build_key
+from shift_schemas.messages import Fact, GazeChunk, Health
+from starlette.exceptions import HTTPException
+
+from shift_gateway import bodies
+from shift_gateway.door import Door
+from shift_gateway.gathering import gathered
+from shift_gateway.page import PAGE
+from shift_gateway.problems import BodyLimit, body, check_id, json_body, message, problem_body, problem_response
+from shift_gateway.recordings import list_recordings, recording_path
+from shift_gateway.replica import Replica
+from shift_gateway.settings import GatewaySettings
+
+SERVICES = tuple(OWNERS)
+EVENTS_WAITING = 2_000
+"""Events that a slow listener may have waiting; then its stream is closed, and it can come again."""
+KEEP_ALIVE_S = 15.0
+
+Opener = Callable[[], Awaitable[Bus]]
+
+
+class Gateway:
+    """What the paths share while the application is up."""
+
+    door: Door
+    replica: Replica
+    mesh: MeshClient
+
+    def __init__(self, settings: GatewaySettings) -> None:
+        self.settings = settings
+        self.metrics = Metrics("gateway")
+
+    @property
+    def recordings(self) -> Path:
+        """Where the finished recordings are."""
+        return self.settings.data / "recordings"
+
+    @asynccontextmanager
+    async def on(self, bus: Bus, clock: Clock) -> AsyncIterator[None]:
+        """Open the replica and the door on a bus, until left."""
+        self.mesh = MeshClient(bus, self.settings.patience_s)
+        self.replica = Replica(bus, self.metrics.dropped)
+        self.door = Door(self.mesh, self.replica, clock)
+        bus.serve(build_key(ServiceKey("gateway", "health")), lambda r: r.reply(encode(self.health())))
+        bus.serve(build_key(ServiceKey("gateway", "metrics")), lambda r: r.reply(self.metrics.text()))
+        bus.token(build_key(ServiceKey("gateway", "alive")))
+        self.replica.reader.start()
+        pulling = asyncio.create_task(self.replica.reader.run())
+        try:
+            yield
+        finally:
+            pulling.cancel()
+            await bus.close()
+
+    def health(self) -> Health:
+        """The gateway's own."""
+        missing = self.replica.missing
+        detail = f"waits for the {', the '.join(missing)}" if missing else ""
+        return Health(service="gateway", ready=not missing, detail=detail, sessions=len(self.replica.views))
+
+
+def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastAPI:
+    """The application. ``open_bus`` is called when it starts, in its loop."""
+    gateway = Gateway(settings)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        async with gateway.on(await open_bus(), clock):
+            yield
+
+    app = FastAPI(
+        title="SHIFT mesh",
+        summary="How should the robot phrase its next explanation for this person, now?",
+        version="v1",
+        lifespan=lifespan,
+        license_info={"name": "MIT"},
+    )
+    app.add_middleware(BodyLimit)
+    app.add_exception_handler(ShiftError, _on_shift_error)
+    app.add_exception_handler(HTTPException, _on_http_error)
+    _add_sessions(app, gateway)
+    _add_interaction(app, gateway)
+    _add_reads(app, gateway)
+    _add_recordings(app, gateway)
+    _add_operations(app, gateway)
+    return app
+
+
+async def _on_shift_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, ShiftError)
+    return problem_response(error)
+
+
+async def _on_http_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    content = {"type": "about:blank", "title": str(error.detail), "status": error.status_code}
+    content["detail"] = f"{request.method} {request.url.path[:200]}: {error.detail}"
+    return JSONResponse(
+        {**content, "errors": []}, error.status_code, headers=error.headers, media_type="application/problem+json"
+    )
+
+
+def _documented(kind: type[BaseModel]) -> dict[str, Any]:
+    """The body in the OpenAPI document; it is read by hand, after ids and session."""
+    schema = kind.model_json_schema(ref_template="#/components/schemas/{model}")
+    definitions = schema.pop("$defs", {})
+    return {
+        "requestBody": {"required": True, "content": {"application/json": {"schema": _inlined(schema, definitions)}}}
+    }
+
+
+def _inlined(node: Any, definitions: dict[str, Any]) -> Any:
+    if isinstance(node, dict):
+        if "$ref" in node:
+            return _inlined(definitions[node["$ref"].rsplit("/", 1)[1]], definitions)
+        return {k: _inlined(v, definitions) for k, v in node.items()}
+    if isinstance(node, list):
+        return [_inlined(v, definitions) for v in node]
+    return node
+
+
+def _created(answer: tuple[dict[str, Any], bool]) -> JSONResponse:
+    content, repeat = answer
+    return JSONResponse(content, 200 if repeat else 201)
+
+
+def _add_sessions(app: FastAPI, gateway: Gateway) -> None:
+    @app.post("/v1/sessions", status_code=201, tags=["sessions"], openapi_extra=_documented(bodies.StartBody))
+    async def start_session(request: Request) -> Response:
+        """Begin a session. The same start again gets the first result."""
+        return _created(await gateway.door.start(await body(request, bodies.StartBody)))
+
+    @app.get("/v1/sessions", tags=["sessions"])
+    async def list_sessions() -> dict[str, Any]:
+        """Every session."""
+        return {"sessions": await gateway.door.sessions()}
+
+    @app.get("/v1/sessions/{session}", tags=["sessions"])
+    async def get_session(session: str) -> dict[str, Any]:
+        """One session, with counts so far."""
+        return await gateway.door.session(check_id("session", session))
+
+    @app.post("/v1/sessions/{session}/end", tags=["sessions"])
+    async def end_session(session: str) -> dict[str, Any]:
+        """End a session; answered once its recording is finished."""
+        return await gateway.door.end(check_id("session", session))
+
+    @app.get("/v1/sessions/{session}/config", tags=["configuration"])
+    async def get_config(session: str) -> dict[str, Any]:
+        """The study in force."""
+        return await gateway.door.config(check_id("session", session))
+
+    @app.patch("/v1/sessions/{session}/config", tags=["configuration"], openapi_extra=_PATCH)
+    async def patch_config(session: str, request: Request) -> dict[str, Any]:
+        """Change the study in force by a JSON merge patch (RFC 7386)."""
+        await gateway.replica.view(check_id("session", session))
+        patch = await json_body(request)
+        if not isinstance(patch, dict):
+            rule = "a merge patch is an object of what is to change"
+            raise MalformedMessage(f"body: {rule}", (FieldError(field="body", value="", rule=rule),))
+        return await gateway.door.configure(session, patch)
+
+
+_PATCH = {
+    "requestBody": {
+        "required": True,
+        "content": {t: {"schema": {"type": "object"}} for t in ("application/merge-patch+json", "application/json")},
+    }
+}
+
+
+def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
+    @app.post(
+        "/v1/sessions/{session}/gaze", status_code=202, tags=["interaction"], openapi_extra=_documented(GazeChunk)
+    )
+    async def post_gaze(session: str, request: Request) -> dict[str, Any]:
+        """A chunk of gaze, points or AOI names."""
+        await gateway.replica.view(check_id("session", session))
+        return await gateway.door.gaze(session, await body(request, GazeChunk))
+
+    @app.websocket("/v1/sessions/{session}/gaze")
+    async def stream_gaze(socket: WebSocket, session: str) -> None:
+        await socket.accept()
+        try:
+            while True:
+                await socket.send_json(await _take_chunk(gateway, session, await socket.receive_text()))
+        except (WebSocketDisconnect, KeyError):  # KeyError: a binary message has no text
+            return
+
+    @app.post(
+        "/v1/sessions/{session}/decisions",
+        status_code=201,
+        tags=["interaction"],
+        openapi_extra=_documented(bodies.DecisionBody),
+    )
+    async def decide(session: str, request: Request) -> Response:
+        """The strategy to use now, and why."""
+        await gateway.replica.view(check_id("session", session))
+        return _created(await gateway.door.decide(session, await body(request, bodies.DecisionBody)))
+
+    @app.post(
+        "/v1/sessions/{session}/performance",
+        status_code=201,
+        tags=["interaction"],
+        openapi_extra=_documented(bodies.PerformanceBody),
+    )
+    async def report_performance(session: str, request: Request) -> Response:
+        """How the task went."""
+        await gateway.replica.view(check_id("session", session))
+        return _created(await gateway.door.report(session, await body(request, bodies.PerformanceBody)))
+
+    @app.post(
+        "/v1/sessions/{session}/override",
+        status_code=201,
+        tags=["interaction"],
+        openapi_extra=_documented(bodies.OverrideBody),
+    )
+    async def override(session: str, request: Request) -> Response:
+        """Choose the strategy of the task's next decision."""
+        await gateway.replica.view(check_id("session", session))
+        return _created(await gateway.door.override(session, await body(request, bodies.OverrideBody)))
+
+    @app.post(
+        "/v1/sessions/{session}/markers",
+        status_code=201,
+        tags=["interaction"],
+        openapi_extra=_documented(bodies.MarkerBody),
+    )
+    async def mark(session: str, request: Request) -> Response:
+        """Note something in the recording."""
+        await gateway.replica.view(check_id("session", session))
+        return _created(await gateway.door.mark(session, await body(request, bodies.MarkerBody)))
+
+
+async def _take_chunk(gateway: Gateway, session: str, text: str) -> dict[str, Any]:
+    try:
+        check_id("session", session)
+        await gateway.replica.view(session)
+        chunk = message(text, GazeChunk)
+        return {**await gateway.door.gaze(session, chunk), "seq": chunk.seq}
+    except ShiftError as e:
+        return problem_body(e)
+
+
+def _add_reads(app: FastAPI, gateway: Gateway) -> None:
+    @app.get("/v1/sessions/{session}/observation", tags=["reading"])
+    async def get_observation(session: str) -> dict[str, Any]:
+        """The partner model."""
+        return await gateway.door.observation(check_id("session", session))
+
+    @app.get("/v1/sessions/{session}/policy", tags=["reading"])
+    async def get_policy(session: str) -> dict[str, Any]:
+        """The policy for the next decision."""
+        return await gateway.door.policy(check_id("session", session))
+
+    @app.get("/v1/sessions/{session}/strategy", tags=["reading"])
+    async def preview(session: str, task: str = Query(default="", description="The task.")) -> dict[str, Any]:
+        """What a decision made now would carry; no side effect."""
+        check_id("session", session)
+        check_id("task", task)
+        return await gateway.door.preview(session, task)
+
+    @app.get("/v1/sessions/{session}/events", tags=["reading"], response_class=StreamingResponse)
+    async def events(session: str) -> Response:
+        """Server-sent events: event = subject, data = the message."""
+        view = await gateway.replica.view(check_id("session", session))
+        waiting: asyncio.Queue[str | None] = asyncio.Queue(EVENTS_WAITING)
+
+        def listen(fact: Fact, payload: str) -> None:
+            if waiting.full():
+                view.listeners.remove(listen)
+                gateway.metrics.dropped("overload")
+                waiting.get_nowait()
+                waiting.put_nowait(None)
+            else:
+                waiting.put_nowait(f"event: {fact.subject}\ndata: {payload}\n\n")
+
+        async def stream() -> AsyncIterator[str]:
+            view.listeners.append(listen)
+            try:
+                yield ": shift-mesh\n\n"
+                while True:
+                    try:
+                        event = await asyncio.wait_for(waiting.get(), KEEP_ALIVE_S)
+                    except TimeoutError:
+                        yield ": still here\n\n"
+                        continue
+                    if event is None:
+                        return
+                    yield event
+            finally:
+                if listen in view.listeners:
+                    view.listeners.remove(listen)
+
+        return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})
+
+
+def _add_recordings(app: FastAPI, gateway: Gateway) -> None:
+    @app.get("/v1/recordings", tags=["recordings"])
+    async def recordings() -> dict[str, Any]:
+        """The recordings that are there."""
+        sessions = {s["session"]: s for s in await gateway.door.sessions()}
+        return {"recordings": list_recordings(gateway.recordings, sessions)}
+
+    @app.get("/v1/recordings/{name}", tags=["recordings"], response_class=FileResponse)
+    async def recording(name: str) -> Response:
+        """A recording's file, or its checksum (``NAME.mcap.sha256``)."""
+        path = recording_path(gateway.recordings, name)
+        if path is None:
+            raise UnknownThing(f"there is no recording {name[:80]}")
+        media_type = "application/octet-stream" if path.suffix == ".mcap" else "text/plain"
+        return FileResponse(path, media_type=media_type, filename=path.name)
+
+
+def _add_operations(app: FastAPI, gateway: Gateway) -> None:
+    @app.get("/healthz", tags=["operations"])
+    async def healthz() -> dict[str, str]:
+        """The process is up."""
+        return {"status": "up"}
+
+    @app.get("/readyz", tags=["operations"])
+    async def readyz() -> Response:
+        """Whether every service answers and is ready; names those that are not."""
+        answers = await asyncio.gather(*(gateway.mesh.health(s) for s in SERVICES))
+        services = {s: _condition(h) for s, h in zip(SERVICES, answers, strict=True)}
+        services["gateway"] = _condition(gateway.health())
+        missing = [s for s, condition in services.items() if condition != "ready"]
+        content = {"ready": not missing, "missing": missing, "services": services}
+        return JSONResponse(content, 503 if missing else 200)
+
+    @app.get("/metrics", tags=["operations"])
+    async def metrics() -> Response:
+        """Prometheus metrics of all services."""
+        texts = await asyncio.gather(*(gateway.mesh.metrics(s) for s in SERVICES))
+        text = gathered([gateway.metrics.text(), *(t for t in texts if t)])
+        return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")
+
+    @app.get("/", include_in_schema=False)
+    async def page() -> HTMLResponse:
+        return HTMLResponse(PAGE)
+
+
+def _condition(health: Health | None) -> str:
+    if health is None:
+        return "does not answer"
+    return "ready" if health.ready else health.detail or "not ready"

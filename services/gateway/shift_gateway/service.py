@@ -1,0 +1,43 @@
+"""The gateway as a process: uvicorn around the application, on the Zenoh bus."""
+
+from __future__ import annotations
+
+import sys
+
+import structlog
+import uvicorn
+from shift_runtime.bus import Bus
+from shift_runtime.clock import SystemClock
+from shift_runtime.logs import configure_logs
+from shift_runtime.settings import read_settings
+from shift_runtime.zenoh_bus import ZenohBus
+from shift_schemas.errors import ShiftError
+
+from shift_gateway.app import make_app
+from shift_gateway.settings import GatewaySettings
+
+log = structlog.get_logger()
+GRACE_S = 3
+"""How long open streams may go on after the stop signal."""
+
+
+def run_gateway() -> None:
+    """Serve until SIGINT or SIGTERM."""
+    try:
+        settings = read_settings(GatewaySettings)
+        assert isinstance(settings, GatewaySettings)
+    except ShiftError as e:
+        sys.stderr.write(f"shift_gateway: {e.detail}\n")
+        sys.exit(2)
+    configure_logs("gateway", settings)
+
+    async def open_bus() -> Bus:
+        return await ZenohBus.open(settings.zenoh, settings.listen)
+
+    app = make_app(settings, open_bus, SystemClock())
+    log.info("started", url=f"http://{settings.host}:{settings.port}", router=settings.zenoh)
+    uvicorn.run(
+        app, host=settings.host, port=settings.port, log_level="warning", access_log=False,
+        timeout_graceful_shutdown=GRACE_S, ws_max_size=256 * 1024, server_header=False,
+    )  # fmt: skip
+    log.info("stopped")
