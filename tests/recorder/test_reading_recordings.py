@@ -129,6 +129,43 @@ def test_of_400_flipped_bits_what_is_read_is_right_or_refused(
         assert refused == 400  # the data's and the summary's checksum leave nothing out
 
 
+def record_heads(data: bytes | bytearray) -> list[int]:
+    """Where the records of a file begin."""
+    at, heads = len(MAGIC), []
+    while at < len(data):
+        heads.append(at)
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    return heads
+
+
+def test_no_flipped_bit_in_the_head_of_a_record_makes_the_reader_skip_messages(tmp_path: Path) -> None:
+    """A chunk that became another kind of record: other readers go on with the next one."""
+    segment = write_segment(tmp_path / "segments", interleaved(6), flush_every=6)
+    data, expected = segment.read_bytes(), [tuple(m) for m in interleaved(6)]
+    heads = record_heads(data)
+    assert len(heads) > 12
+    other = tmp_path / "flipped.mcap"
+    for head in heads:
+        for bit in range(9 * 8):
+            flipped = bytearray(data)
+            flipped[head + bit // 8] ^= 1 << bit % 8
+            other.write_bytes(flipped)
+            found, _, _ = read(other)
+            assert [tuple(m) for m in found] == expected[: len(found)], (head, bit)
+
+
+def test_a_chunk_that_swallows_what_follows_is_refused(segment: Path, tmp_path: Path) -> None:
+    """Other readers take the chunk, skip the rest of its length, and lose the chunks in there."""
+    data = bytearray(segment.read_bytes())
+    first, second, third = [head for head in record_heads(data) if data[head] == CHUNK][:3]
+    data[second + 1 : second + 9] = (third - second - 9).to_bytes(8, "little")
+    other = tmp_path / "swallowed.mcap"
+    other.write_bytes(data)
+    found, _, error = read(other)
+    assert error is not None
+    assert len(found) == len([m for m in Recording(segment).located() if m.chunk == first])
+
+
 def test_the_checksum_file_finds_each_of_400_flipped_bits(whole: Path, tmp_path: Path) -> None:
     data, generator = whole.read_bytes(), random.Random(15)
     other = tmp_path / whole.name
