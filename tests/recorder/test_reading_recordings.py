@@ -25,6 +25,7 @@ from recorder_fixtures import (
     write_segment,
 )
 from shift_recorder.checksum import check
+from shift_recorder.parsing import CHUNK
 from shift_recorder.reading import RecordedMessage, Recording, fact_of, facts
 from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing
 
@@ -242,13 +243,13 @@ def bombs() -> dict[str, bytes]:
     assert len(packed) < 150_000
     wide = zstandard.ZstdCompressionParameters.from_level(1, window_log=30)
     lz = lz4.frame.LZ4FrameCompressor(block_size=lz4.frame.BLOCKSIZE_MAX4MB)
-    lz4_bomb = zeros(lz, 300_000_000)
+    lz4_bomb = zeros(lz, 300_000_000)  # 1 KB per 255 KB is the best that lz4 can
     return {
         "zstd, honest": chunk("zstd", packed, 1_500_000_000),
         "zstd, lying": chunk("zstd", packed, 1000),
         "zstd, lying a little": chunk("zstd", packed, 32 * 2**20),
         "zstd, wide window": chunk(
-            "zstd", zeros(zstandard.ZstdCompressor(compression_params=wide).compressobj()), 1000
+            "zstd", zeros(zstandard.ZstdCompressor(compression_params=wide).compressobj(), 100_000_000), 1000
         ),
         "lz4, honest": chunk("lz4", lz4_bomb, 300_000_000),
         "lz4, lying": chunk("lz4", lz4_bomb, 32 * 2**20),
