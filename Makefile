@@ -75,7 +75,7 @@ $(BIN)/pip:
 	    fi; \
 	done; \
 	if [ -z "$$found" ]; then \
-	    echo "Python 3.11 or newer is needed, and $(or $(PYTHON),none called python3 is). Say which: make setup PYTHON=/path/to/python3.11" >&2; \
+	    echo "Python 3.11 or newer is needed: $(if $(PYTHON),$(PYTHON) is not one,none was found). make setup PYTHON=/path/to/python3" >&2; \
 	    exit 1; \
 	fi; \
 	if ! "$$found" -c 'import ensurepip, venv' 2>/dev/null; then \
