@@ -205,7 +205,9 @@ class Decision(Fact):
     suggested: Strategy = Field(description="The scoring system's action.")
     actions: list[Strategy] = Field(description="All actions, in their fixed order.")
     probabilities: list[float] = Field(description="The policy's row, per action; sums to 1.")
-    propensity: float | None = Field(description="Probability of the strategy taken; none where it was overridden.")
+    propensity: float | None = Field(
+        default=None, description="Probability of the strategy taken; none where it was overridden."
+    )
     explored: bool = Field(description="Not the greedy action.")
     policy_source: PolicySource = Field(description="learner, last_policy, scoring or override.")
     versions: Versions
@@ -267,7 +269,7 @@ class Transition(Fact):
     state: str = Field(description="The row that was updated.")
     action: Strategy
     reward: float
-    propensity: float | None = Field(description="None where the action was an override.")
+    propensity: float | None = Field(default=None, description="None where the action was an override.")
     versions: Versions
     value: float = Field(description="The row's value of the action after the update.")
 

@@ -4,5 +4,11 @@ from shift_runtime.process import run_service
 
 from shift_decider.service import CORE
 
-if __name__ == "__main__":
+
+def main() -> None:
+    """Run it."""
     run_service(CORE)
+
+
+if __name__ == "__main__":
+    main()

@@ -2,5 +2,11 @@
 
 from shift_gateway.service import run_gateway
 
-if __name__ == "__main__":
+
+def main() -> None:
+    """Run it."""
     run_gateway()
+
+
+if __name__ == "__main__":
+    main()

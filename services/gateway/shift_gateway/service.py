@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 
 import structlog
@@ -36,6 +37,8 @@ def run_gateway() -> None:
 
     app = make_app(settings, open_bus, SystemClock())
     log.info("started", url=f"http://{settings.host}:{settings.port}", router=settings.zenoh)
+    for number in (signal.SIGINT, signal.SIGTERM):  # uvicorn raises the signal again when it is done: exit with 0
+        signal.signal(number, lambda *_: None)
     uvicorn.run(
         app, host=settings.host, port=settings.port, log_level="warning", access_log=False,
         timeout_graceful_shutdown=GRACE_S, ws_max_size=256 * 1024, server_header=False,

@@ -13,6 +13,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterable
+from contextlib import suppress
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -23,7 +24,7 @@ from shift_runtime.journal import Batch
 from shift_runtime.reader import ReadFact
 from shift_runtime.settings import MeshSettings
 from shift_runtime.worker import Asked, Core, Worker, _Turn
-from shift_schemas.errors import ShiftError, Unavailable
+from shift_schemas.errors import DamagedRecording, ShiftError, Unavailable
 from shift_schemas.keys import READS
 from shift_schemas.messages import Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
 from shift_schemas.study_text import study_from_json
@@ -76,7 +77,6 @@ class RecorderWorker(Worker[RecorderState]):
         self._writers: dict[str, SegmentWriter] = {}
         self._unflushed: dict[tuple[str, str], int] = {}
         self._ends: dict[str, list[Asked]] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
 
     # --- life ---
 
@@ -203,9 +203,7 @@ class RecorderWorker(Worker[RecorderState]):
     # --- ending ---
 
     def _begin_end(self, session: str) -> None:
-        task = asyncio.get_running_loop().create_task(self._end(session))
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        self._background(self._end(session))
 
     async def _end(self, session: str) -> None:
         try:
@@ -215,6 +213,8 @@ class RecorderWorker(Worker[RecorderState]):
             self._write(session, state, core.ended(state, self.clock.now()), self.journal.heads[session] + 1)
             self._flush()
             finished = await asyncio.to_thread(self._finished, session, state)
+            if finished.missing:
+                finished = await self._refilled(session, state, finished)
         except ShiftError as e:
             log.warning("the session cannot end yet", session=session, error=e.detail)
             for asked in self._ends.pop(session, []):
@@ -230,6 +230,18 @@ class RecorderWorker(Worker[RecorderState]):
         )
         self.enqueue(Asked(session, "end_session", message, requests))
         log.info("recording finished", session=session, file=str(finished.path), messages=sum(finished.counts.values()))
+
+    async def _refilled(self, session: str, state: RecorderState, holed: FinishedRecording) -> FinishedRecording:
+        """A segment was damaged: the journals still have what it held; record that again and finish again."""
+        log.warning("the recording has holes; reading the journals again", session=session, missing=holed.missing)
+        for owner in holed.missing:
+            self.reader.cursors[session, owner] = self.processed[session, owner] = 0
+        await self._converge(session)
+        self._write(session, state, core.ended(state, self.clock.now()), self.journal.heads[session] + 1)
+        finished = await asyncio.to_thread(self._finished, session, state)
+        if finished.missing:
+            raise DamagedRecording(f"the recording of {session} has holes: {finished.missing}")
+        return finished
 
     async def _converge(self, session: str) -> None:
         """Read until every service has read the end and all that came before it."""
@@ -294,8 +306,9 @@ def _has_not_read(peer: str, pages: dict[str, OutboxPage], session: str) -> bool
 def _first_and_last_policy(sources: Iterable[Path]) -> tuple[bytes, bytes] | None:
     found: tuple[bytes, bytes] | None = None
     for source in sources:
-        for message in Recording(source).messages({"policy"}):
-            found = (found[0] if found else message.data, message.data)
+        with suppress(DamagedRecording):
+            for message in Recording(source).messages({"policy"}):
+                found = (found[0] if found else message.data, message.data)
     return found
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -135,6 +135,7 @@ class Worker(Generic[S]):
         self._stopping = False
         self._alarm = ""
         self._overload = 0
+        self._tasks: set[asyncio.Task[None]] = set()
 
     # --- life ---
 
@@ -298,18 +299,34 @@ class Worker(Generic[S]):
         session = read.fact.session
         if read.seq != self.processed.get((session, read.owner), 0) + 1:
             return  # a commit failed meanwhile: this one is read again in its turn
+        if read.fact.subject in self.core.reads[read.owner]:
+            try:
+                step = self.core.step(self._state(session), read.fact, self.clock.now())
+            except (NotYet, UnknownThing, Unavailable):
+                self._hold_back(session, read)
+                return
+            self._take(turn, session, step)
+            self.metrics.read(read.fact.subject)
         self.processed[session, read.owner] = read.seq
         turn.batch.cursors[session, read.owner] = read.seq
-        if read.fact.subject not in self.core.reads[read.owner]:
-            return
-        self.metrics.read(read.fact.subject)
-        try:
-            self._take(turn, session, self.core.step(self._state(session), read.fact, self.clock.now()))
-        except ShiftError as e:
-            log.error("a fact could not be applied", session=session, subject=read.fact.subject, error=e.detail)
-            self.metrics.dropped("refused")
         if isinstance(read.fact, Session) and read.fact.state == "ended":
             turn.ended.add(session)
+
+    def _hold_back(self, session: str, read: ReadFact) -> None:
+        """Its session or configuration has not been read yet: this fact is read again after it."""
+        self.reader.cursors[session, read.owner] = read.seq - 1
+
+        async def in_turn() -> None:
+            if await self.reader.pull("recorder"):
+                await asyncio.sleep(HINT_WAIT_S)
+                await self.reader.pull(read.owner)
+
+        self._background(in_turn())
+
+    def _background(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def _answer(self, turn: _Turn, asked: Asked) -> None:
         """Carry out a command once; what it gives is told after the commit."""
@@ -416,7 +433,7 @@ class Worker(Generic[S]):
                 return
             self.enqueue(asked)
 
-        asyncio.get_running_loop().create_task(ask_again())
+        self._background(ask_again())
 
     # --- the end of a turn ---
 

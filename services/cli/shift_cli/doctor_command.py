@@ -1,0 +1,81 @@
+"""``shift-mesh doctor``: is everything reachable, and if not, why."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+import typer
+
+
+class Finding(NamedTuple):
+    """One thing looked at."""
+
+    what: str
+    fine: bool
+    detail: str
+
+
+def doctor(
+    url: Annotated[str, typer.Option(help="The gateway.", envvar="SHIFT_URL")] = "http://127.0.0.1:8080",
+    zenoh: Annotated[str, typer.Option(help="The router.", envvar="SHIFT_ZENOH")] = "tcp/127.0.0.1:7447",
+    data: Annotated[Path, typer.Option(help="The data folder.", envvar="SHIFT_DATA")] = Path("data"),
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.")] = False,
+) -> None:
+    """Is everything reachable, and if not, why. Exit code 1 when something is not.
+
+    \b
+    shift-mesh doctor
+    shift-mesh doctor --url http://127.0.0.1:9000 --json
+    """
+    findings = [_router(zenoh), *_services(url), _folder(data)]
+    if as_json:
+        typer.echo(json.dumps({"fine": all(f.fine for f in findings), "findings": [f._asdict() for f in findings]}))
+    else:
+        _print(findings)
+    raise typer.Exit(0 if all(f.fine for f in findings) else 1)
+
+
+def _print(findings: list[Finding]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None)
+    for column in ("", "what", "detail"):
+        table.add_column(column)
+    for found in findings:
+        table.add_row("[green]ok[/]" if found.fine else "[red]no[/]", found.what, found.detail)
+    Console().print(table)
+
+
+def _router(zenoh: str) -> Finding:
+    host, _, port = zenoh.partition("/")[2].rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=2.0).close()
+    except (OSError, ValueError) as e:
+        return Finding("router", False, f"{zenoh}: {e}; start the mesh with: shift-mesh up")
+    return Finding("router", True, zenoh)
+
+
+def _services(url: str) -> list[Finding]:
+    from shift_runtime.rest_client import RestClient
+    from shift_schemas.errors import Unavailable
+
+    try:
+        with RestClient(url) as shift:
+            ready = shift.ready()
+    except Unavailable as e:
+        return [Finding("gateway", False, e.detail)]
+    return [Finding(s, condition == "ready", condition) for s, condition in ready["services"].items()]
+
+
+def _folder(data: Path) -> Finding:
+    if not data.exists():
+        return Finding("data folder", False, f"{data} is not there; shift-mesh up makes it, or give --data")
+    if not os.access(data, os.W_OK):
+        return Finding("data folder", False, f"{data} is read-only")
+    room = os.statvfs(data)
+    return Finding("data folder", True, f"{data}, {room.f_bavail * room.f_frsize / 1e9:.1f} GB free")

@@ -1,0 +1,74 @@
+"""``shift-mesh``: the command line. Every flag is an environment variable too (``SHIFT_PORT``).
+
+Exit codes: 0 fine, 1 the thing checked is not so, 2 wrong use. What is heavy is imported by the
+command that needs it, so that ``--help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from shift_schemas.errors import ShiftError
+
+from shift_cli import doctor_command, gaze_command, simulate_command
+
+app = typer.Typer(
+    name="shift-mesh",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    help="How should the robot phrase its next explanation for this person, now?",
+)
+
+
+@app.command()
+def up(
+    demo: Annotated[bool, typer.Option(help="A simulated person in session demo.", envvar="SHIFT_DEMO")] = False,
+    host: Annotated[str, typer.Option(help="Address of the gateway.", envvar="SHIFT_HOST")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port of the gateway.", envvar="SHIFT_PORT", min=1, max=65535)] = 8080,
+    zenoh: Annotated[
+        str, typer.Option(help="Endpoint of the mesh's router.", envvar="SHIFT_ZENOH")
+    ] = "tcp/127.0.0.1:7447",
+    data: Annotated[Path, typer.Option(help="Recordings, studies and journals.", envvar="SHIFT_DATA")] = Path("data"),
+    router: Annotated[
+        str | None, typer.Option(help="A router that runs already; none is started then.", envvar="SHIFT_ROUTER")
+    ] = None,
+) -> None:
+    """Run the mesh on this machine until Ctrl-C.
+
+    \b
+    shift-mesh up                       # at http://127.0.0.1:8080
+    shift-mesh up --demo --port 9000    # with a simulated person in session demo
+    """
+    from shift_cli.up import run_up
+
+    raise typer.Exit(run_up(demo, host, port, zenoh, data, router))
+
+
+@app.command()
+def router() -> None:
+    """Run the router alone; it listens on SHIFT_ROUTER_LISTEN."""
+    from shift_runtime.router import main as run_router
+
+    run_router()
+
+
+app.command("doctor")(doctor_command.doctor)
+app.command("simulate")(simulate_command.simulate)
+app.add_typer(gaze_command.app, name="gaze")
+
+
+def main() -> None:
+    """The entry point: an error of ours is one sentence and exit code 2, never a traceback."""
+    try:
+        app()
+    except ShiftError as e:
+        sys.stderr.write(f"shift-mesh: {e.detail}\n")
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,183 @@
+"""The supervisor of ``shift-mesh up``: every service its own process, restarted when it dies.
+
+It imports everything once and forks, so that seven Python processes start in the time of one and come
+back at once after a crash. So it must itself never open a Zenoh session or start a thread. On a stop
+the doors go first, then the recorder, which finishes its files while the others still answer.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import importlib
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import setproctitle
+
+_PR_SET_PDEATHSIG = 1
+_SIGNALS = {signal.SIGINT, signal.SIGTERM, signal.SIGCHLD}
+POLL_S = 0.1
+GRACE_S = 12.0
+"""How long a service may take to stop; the recorder finishes files in it."""
+STEADY_S = 10.0
+"""After so long a life, the next death is a first one again."""
+SETTINGS_WRONG = 2
+
+
+@dataclass
+class Program:
+    """A process of the mesh: its package and when it is told to stop (lower goes first)."""
+
+    name: str
+    module: str
+    stops: int
+    pid: int | None = None
+    started: float = 0.0
+    deaths: int = 0
+    due: float = 0.0
+    """When it is to be started again, on the monotonic clock."""
+
+
+def programs(demo: bool, router: bool) -> list[Program]:
+    """The processes of the mesh in the order of their start."""
+    mesh = [
+        Program("router", "shift_runtime.router", 5),
+        Program("recorder", "shift_recorder", 3),
+        Program("monitor", "shift_monitor", 4),
+        Program("decider", "shift_decider", 4),
+        Program("learner", "shift_learner", 4),
+        Program("gateway", "shift_gateway", 2),
+        Program("simulator", "shift_simulator", 1),
+    ]
+    left_out = ({"simulator"} if not demo else set()) | ({"router"} if not router else set())
+    return [p for p in mesh if p.name not in left_out]
+
+
+@dataclass
+class Supervisor:
+    """Runs ``programs`` until a signal. ``tell`` says what happens, ``tick`` is called ten times a second."""
+
+    programs: Sequence[Program]
+    tell: Callable[[str], None]
+    tick: Callable[[], None] = lambda: None
+    _entries: dict[str, Callable[[], None]] = field(default_factory=dict)
+
+    def run(self) -> int:
+        """Start everything, keep it running, stop it on SIGINT or SIGTERM; the exit code."""
+        for program in self.programs:
+            self._entries[program.name] = _entry(program.module)
+        gc.collect()
+        gc.freeze()
+        signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        code = 0
+        try:
+            for program in self.programs:
+                self._start(program)
+            code = self._watch()
+        finally:
+            self._stop()
+        return code
+
+    def _watch(self) -> int:
+        while True:
+            received = signal.sigtimedwait(_SIGNALS, POLL_S)
+            if received is not None and received.si_signo != signal.SIGCHLD:
+                self.tell(f"{signal.Signals(received.si_signo).name}: stopping")
+                return 0
+            for program, status in self._dead():
+                if os.waitstatus_to_exitcode(status) == SETTINGS_WRONG:
+                    self.tell(f"the {program.name} cannot run with these settings; stopping")
+                    return SETTINGS_WRONG
+                self._mourn(program, status)
+            now = time.monotonic()
+            for program in self.programs:
+                if program.pid is None and now >= program.due:
+                    self._start(program)
+            self.tick()
+
+    def _dead(self) -> list[tuple[Program, int]]:
+        found = []
+        for program in self.programs:
+            if program.pid is not None:
+                pid, status = os.waitpid(program.pid, os.WNOHANG)
+                if pid:
+                    program.pid = None
+                    found.append((program, status))
+        return found
+
+    def _mourn(self, program: Program, status: int) -> None:
+        now = time.monotonic()
+        program.deaths = 0 if now - program.started > STEADY_S else program.deaths + 1
+        pause = min(5.0, 0.1 * 2**program.deaths) if program.deaths else 0.0
+        program.due = now + pause
+        code = os.waitstatus_to_exitcode(status)
+        why = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        self.tell(f"the {program.name} {why}; it starts again" + (f" in {pause:.1f} s" if pause else ""))
+
+    def _start(self, program: Program) -> None:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        pid = os.fork()
+        if pid == 0:
+            self._become(program)
+        program.pid = pid
+        program.started = time.monotonic()
+
+    def _become(self, program: Program) -> None:
+        """In the child: be the service, and never come back."""
+        code = 1
+        try:
+            os.setpgid(0, 0)  # Ctrl-C is the supervisor's; it stops the services in their order
+            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+            setproctitle.setproctitle(f"python -m {program.module}")
+            self._entries[program.name]()
+            code = 0
+        except SystemExit as e:
+            code = e.code if isinstance(e.code, int) else int(e.code is not None)
+            if isinstance(e.code, str):
+                sys.stderr.write(e.code + "\n")
+        except BaseException:
+            sys.excepthook(*sys.exc_info())
+        finally:
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
+
+    def _stop(self) -> None:
+        for rank in sorted({p.stops for p in self.programs}):
+            wave = [p for p in self.programs if p.stops == rank and p.pid is not None]
+            for program in wave:
+                _signal(program, signal.SIGTERM)
+            self._reap(wave, time.monotonic() + GRACE_S)
+        self.tell("stopped")
+
+    def _reap(self, wave: list[Program], deadline: float) -> None:
+        while any(p.pid is not None for p in wave):
+            self._dead()
+            if time.monotonic() > deadline:
+                for program in wave:
+                    self.tell(f"the {program.name} does not stop; it is killed")
+                    _signal(program, signal.SIGKILL)
+                deadline = time.monotonic() + GRACE_S
+            time.sleep(0.01)
+
+
+def _signal(program: Program, number: signal.Signals) -> None:
+    if program.pid is not None:
+        try:
+            os.kill(program.pid, number)
+        except ProcessLookupError:
+            return
+
+
+def _entry(module: str) -> Callable[[], None]:
+    """The module's ``main``, imported now so that every fork has it."""
+    name = module if module == "shift_runtime.router" else f"{module}.__main__"
+    entry: Callable[[], None] = importlib.import_module(name).main
+    return entry

@@ -1,0 +1,113 @@
+"""``shift-mesh up``: the mesh on this machine, one command."""
+
+from __future__ import annotations
+
+import fcntl
+import http.client
+import os
+import socket
+import sys
+import time
+from pathlib import Path
+from typing import IO
+
+from rich.console import Console
+from shift_schemas.errors import InvalidSettings
+
+from shift_cli.supervisor import Program, Supervisor, programs
+
+LOCAL = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+console = Console(stderr=True, highlight=False)
+
+
+def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str | None) -> int:
+    """Run the mesh until Ctrl-C or SIGTERM; the exit code.
+
+    Raises
+    ------
+    InvalidSettings
+        A port is taken, or the data folder cannot be used or is in use.
+    """
+    lock = _lock(data)
+    _check_free(host, port, "port", "--port")
+    if router is None:
+        _check_free(*_endpoint(zenoh), "endpoint", "--zenoh")
+    url = f"http://{LOCAL.get(host, host)}:{port}"
+    os.environ |= {
+        "SHIFT_DATA": str(data), "SHIFT_HOST": host, "SHIFT_PORT": str(port), "SHIFT_URL": url,
+        "SHIFT_ZENOH": router or zenoh, "SHIFT_ROUTER_LISTEN": zenoh,
+    }  # fmt: skip
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a thread in the supervisor would not survive the fork
+    mesh = programs(demo, router is None)
+    announcer = _Announcer(LOCAL.get(host, host), port, url, mesh)
+    console.print(f"SHIFT mesh: data in {data}/, gateway at {url}", soft_wrap=True)
+    code = Supervisor(mesh, lambda text: console.print(text, soft_wrap=True), announcer.tick).run()
+    lock.close()
+    return code
+
+
+class _Announcer:
+    """Says once when everything is ready."""
+
+    def __init__(self, host: str, port: int, url: str, mesh: list[Program]) -> None:
+        self._host, self._port, self._url, self._mesh = host, port, url, mesh
+        self._since = time.monotonic()
+        self._done = False
+
+    def tick(self) -> None:
+        """Look; nothing more once it was said."""
+        if self._done or not self._ready():
+            return
+        self._done = True
+        took = time.monotonic() - self._since
+        names = ", ".join(p.name for p in self._mesh)
+        console.print(f"ready in {took:.1f} s: {names}\nopen {self._url}  -  stop with Ctrl-C", soft_wrap=True)
+
+    def _ready(self) -> bool:
+        connection = http.client.HTTPConnection(self._host, self._port, timeout=1.0)
+        try:
+            connection.request("GET", "/readyz")
+            return connection.getresponse().status == 200
+        except (OSError, http.client.HTTPException):
+            return False
+        finally:
+            connection.close()
+
+
+def _lock(data: Path) -> IO[str]:
+    """The data folder is one mesh's at a time: two would write the same journals."""
+    try:
+        (data / "state").mkdir(parents=True, exist_ok=True)
+        (data / "studies").mkdir(exist_ok=True)
+        file = open(data / "state" / "lock", "w")  # noqa: SIM115 (held for as long as the mesh runs)
+    except OSError as e:
+        raise InvalidSettings(f"{data} cannot be used: {e.strerror}; give another folder with --data") from e
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as e:
+        raise InvalidSettings(f"another mesh uses {data}; stop it, or give another folder with --data") from e
+    return file
+
+
+def _endpoint(zenoh: str) -> tuple[str, int]:
+    protocol, _, rest = zenoh.partition("/")
+    host, _, port = rest.partition("?")[0].rpartition(":")
+    if protocol not in ("tcp", "tls", "quic") or not host or not port.isdigit():
+        raise InvalidSettings(f"--zenoh is {zenoh!r}: an endpoint is PROTOCOL/HOST:PORT, such as tcp/127.0.0.1:7447")
+    return host.strip("[]"), int(port)
+
+
+def _check_free(host: str, port: int, what: str, flag: str) -> None:
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except OSError as e:
+        raise InvalidSettings(f"{what} {host}:{port} cannot be used: {e.strerror}; choose another with {flag}") from e
+
+
+def fail(error: InvalidSettings) -> int:
+    """Say what is wrong with the settings; exit code 2."""
+    sys.stderr.write(f"shift-mesh: {error.detail}\n")
+    return 2
