@@ -1,0 +1,107 @@
+"""A mesh of its own for a test: ``shift-mesh up`` on free ports, in a folder of its own."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+
+READY_WITHIN_S = 60.0
+
+
+def free_port() -> int:
+    """A port that nobody listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@dataclass
+class LiveMesh:
+    """A running mesh."""
+
+    process: subprocess.Popen[bytes]
+    port: int
+    zenoh: str
+    data: Path
+    log: Path
+
+    @property
+    def url(self) -> str:
+        """The gateway."""
+        return f"http://127.0.0.1:{self.port}"
+
+    def pid_of(self, package: str) -> int:
+        """The process of a service, found by its package in its command line."""
+        found = [
+            int(entry.name)
+            for entry in Path("/proc").iterdir()
+            if entry.name.isdigit() and self._is(entry, package)
+        ]
+        assert len(found) == 1, f"{package}: {found}"
+        return found[0]
+
+    def _is(self, entry: Path, package: str) -> bool:
+        try:
+            line = (entry / "cmdline").read_bytes().decode(errors="replace")
+            parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+        except OSError:
+            return False
+        return package in line and parent == self.process.pid
+
+    def kill(self, package: str) -> int:
+        """kill -9 of a service; the pid that it had."""
+        pid = self.pid_of(package)
+        os.kill(pid, signal.SIGKILL)
+        return pid
+
+    def wait_ready(self) -> None:
+        """Wait until ``/readyz`` is true."""
+        end = time.monotonic() + READY_WITHIN_S
+        while time.monotonic() < end:
+            try:
+                if httpx.get(f"{self.url}/readyz", timeout=5.0).status_code == 200:
+                    return
+            except httpx.HTTPError:
+                pass
+            assert self.process.poll() is None, self.log.read_text()
+            time.sleep(0.05)
+        raise AssertionError(self.log.read_text())
+
+    def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """Stop it; the exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        return self.process.wait(60)
+
+
+@contextmanager
+def running_mesh(folder: Path, *flags: str, port: int | None = None, zenoh: str | None = None) -> Iterator[LiveMesh]:
+    """``shift-mesh up`` until left; stopped, and its log shown where something went wrong."""
+    port = port or free_port()
+    zenoh = zenoh or f"tcp/127.0.0.1:{free_port()}"
+    log = folder / "mesh.log"
+    command = [sys.executable, "-m", "shift_cli.main", "up", "--port", str(port), "--zenoh", zenoh]
+    folder.mkdir(parents=True, exist_ok=True)
+    with open(log, "ab") as output:
+        process = subprocess.Popen(
+            [*command, "--data", str(folder / "data"), *flags], stdout=output, stderr=output, cwd=folder
+        )
+    mesh = LiveMesh(process, port, zenoh, folder / "data", log)
+    try:
+        mesh.wait_ready()
+        yield mesh
+    except BaseException:
+        print(log.read_text()[-8000:])
+        raise
+    finally:
+        mesh.stop()
