@@ -288,6 +288,30 @@ class LearnerSettings(_Part):
     prior_value: Annotated[float, Field(ge=0, le=100)] = Field(
         default=1.0, description="Q0 of the suggested action; fitted."
     )
+    exploration: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=1.0, description="Width of ucb1's bonus, in units of its sqrt(2 ln n / visits); Auer et al. 2002."
+    )
+    thompson_states: Literal["cognitive", "triples"] = Field(
+        default="cognitive", description="What thompson keeps a posterior for: six states or 30 triples; chosen."
+    )
+    prior_strength: Annotated[float, Field(ge=0, le=100)] = Field(
+        default=4.0, description="Imagined results behind the scoring prior: thompson, linear-thompson; chosen."
+    )
+    noise: Annotated[float, Field(gt=0, le=100)] = Field(
+        default=0.5, description="Standard deviation of a reward around linear-thompson's line; chosen."
+    )
+    planning_horizon: int = Field(
+        default=6, ge=0, le=50, description="How many interactions planner looks ahead; chosen, 4 to 30 do the same."
+    )
+    planning_discount: Probability = Field(
+        default=0.9, description="What planner's next interaction is worth of the present one; chosen."
+    )
+    flip_probability: Annotated[float, Field(gt=0, lt=1)] = Field(
+        default=0.08, description="planner: how probable it is that an entry of the scoring table is wrong; chosen."
+    )
+    change_probability: Annotated[float, Field(ge=0, lt=1)] = Field(
+        default=0.005, description="planner: how probable it is that the person changes at an interaction; chosen."
+    )
 
 
 class Study(_Part):

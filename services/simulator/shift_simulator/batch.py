@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from shift_learner.learner import Context, Learner, Taken
 from shift_learner.learners import learner_named
+from shift_learner.learners.planning import engine
 from shift_schemas.randomness import pick
 
 from shift_simulator.draws import Bools, Floats, Ints
@@ -35,6 +36,8 @@ def batch_learner(context: Context, runs: int) -> BatchLearner:
     if settings.name == "q-learning":
         prior = np.full(runs, settings.prior_value if settings.scoring_prior else 0.0)
         return BatchQLearning(context, prior, np.full(runs, settings.learning_rate), np.full(runs, settings.discount))
+    if settings.name == "planner":
+        return BatchPlanner(context, runs)
     return OneByOne(context, learner_named(settings.name), runs)
 
 
@@ -106,6 +109,24 @@ class BatchQLearning:
             self._values[self._runs, state, action] = before + self._rate * (target - before)
         rows: Floats = self._values[self._runs, following]
         return rows
+
+
+class BatchPlanner:
+    """The planner, its own engine folding all runs at once."""
+
+    def __init__(self, context: Context, runs: int) -> None:
+        self._model = engine.model_of(context)
+        self._state = engine.start(self._model, runs)
+
+    def decide(self, triple: Ints, u: Floats) -> Ints:
+        """The best action, the first of equals."""
+        action: Ints = engine.values_at(self._model, self._state, triple).argmax(axis=1)
+        self._state = engine.decided(self._model, self._state, triple, action)
+        return action
+
+    def learn(self, triple: Ints, action: Ints, reward: Floats) -> None:
+        """A reward above 0 is a success."""
+        self._state = engine.rewarded(self._model, self._state, triple, action, reward > 0)
 
 
 class OneByOne:

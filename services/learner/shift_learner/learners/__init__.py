@@ -5,10 +5,11 @@ from __future__ import annotations
 from shift_schemas.errors import InvalidStudy
 
 from shift_learner.learner import Learner
+from shift_learner.learners.planner import Planner
 from shift_learner.learners.q_learning import QLearning
 from shift_learner.learners.scoring import Scoring
 
-LEARNERS: dict[str, Learner] = {learner.name: learner for learner in (QLearning(), Scoring())}
+LEARNERS: dict[str, Learner] = {learner.name: learner for learner in (Scoring(), QLearning(), Planner())}
 
 
 def learner_named(name: str) -> Learner:

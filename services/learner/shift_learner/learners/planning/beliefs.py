@@ -1,0 +1,163 @@
+"""Beliefs about one person (or one per run): who of the plausible people it is, and how probable success is.
+
+Pure; arrays have a leading axis of runs, live it is 1. Three experts predict whether an action succeeds:
+
+1. *wrong entries*: for each strategy a posterior over its 2**10 columns. An action succeeds when every strategy's
+   level suits; the strategies' posteriors are held as independent and each is updated with the others' expectation
+   (assumed density filtering, Minka 2001; with a success the product is exact).
+2. *a preference*: the exact posterior over the list of preferences.
+3. *nothing known*: a Beta posterior for each triple and action by itself, that slowly forgets.
+
+They are averaged by how well each has predicted (Bayesian model averaging, Hoeting et al. 1999), so that the last
+takes over where both ideas of the person are wrong. People change: after every result each posterior gives a small
+share back to its prior (fixed share, Herbster & Warmuth 1998), which is exact for somebody who is replaced by
+another with that probability.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from shift_schemas.study import LearnerSettings
+
+from shift_learner.learners.planning.plausible import Bools, Floats, Ints, Plausible
+
+LOW, HIGH = 0.025, 0.975
+"""Chance of success where an expert of the first two says no, or yes; chosen: one in forty is chance."""
+EXPERTS = (0.5, 0.4, 0.1)
+"""Prior of the three experts; chosen on people generated around other tables (docs/learners.md)."""
+CELL_SUCCESS, CELL_FAILURE = 0.3, 0.7
+"""Beta prior of the third expert; chosen: an action that nothing is known of mostly fails, one trial decides."""
+CELL_MEMORY = 0.98
+"""What the third expert keeps of its counts at each result; chosen: half is gone after 34."""
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """Posterior weights, [runs, ...] each."""
+
+    columns: tuple[Floats, ...]
+    preferences: Floats
+    successes: Floats
+    failures: Floats
+    experts: Floats
+
+
+@dataclass(frozen=True)
+class Priors:
+    """Where beliefs start, and what they give back to."""
+
+    plausible: Plausible
+    columns: tuple[Floats, ...]
+    experts: Floats
+    change: float
+
+
+def priors(plausible: Plausible, settings: LearnerSettings) -> Priors:
+    """The priors that the settings ask for; without the scoring prior only the third expert is left."""
+    flip = settings.flip_probability
+    columns = []
+    for column in plausible.columns:
+        weight = flip**column.flips * (1 - flip) ** (column.flips.max() - column.flips)
+        columns.append(weight / weight.sum())
+    experts = np.array(EXPERTS if settings.scoring_prior else (0.0, 0.0, 1.0))
+    return Priors(plausible, tuple(columns), experts, settings.change_probability)
+
+
+def started(prior: Priors, runs: int) -> Beliefs:
+    """Before the first result."""
+    cells = np.zeros((runs, prior.plausible.preferences.success.shape[1]))
+    return Beliefs(
+        tuple(np.repeat(column[None], runs, axis=0) for column in prior.columns),
+        np.repeat(prior.plausible.preferences.prior[None], runs, axis=0),
+        cells,
+        cells,
+        np.repeat(prior.experts[None], runs, axis=0),
+    )
+
+
+def chances(beliefs: Beliefs, prior: Priors) -> Floats:
+    """Probability of success, [runs, 30, actions]."""
+    people = prior.plausible
+    suits: Floats = np.ones(())
+    for s, (weights, column) in enumerate(zip(beliefs.columns, people.columns, strict=True)):
+        by_level = (weights @ column.suits).reshape(len(weights), -1, column.levels)
+        suits = suits * by_level[:, :, people.levels[:, s]]
+    preferred = (beliefs.preferences @ people.preferences.success).reshape(np.shape(suits))
+    cells = _cell_chances(beliefs.successes, beliefs.failures).reshape(np.shape(suits))
+    first, second, third = (beliefs.experts[:, i, None, None] for i in range(3))
+    mixed: Floats = first * _noisy(suits) + second * _noisy(preferred) + third * cells
+    return mixed
+
+
+def told(beliefs: Beliefs, prior: Priors, triple: Ints, action: Ints, success: Bools) -> Beliefs:
+    """After a result in each run: [runs] each."""
+    people = prior.plausible
+    runs, cell = np.arange(len(triple)), triple * len(people.levels) + action
+    suited = [c.suits.T[triple * c.levels + people.levels[action, s]] for s, c in enumerate(people.columns)]
+    fit = [_dot(w, s) for w, s in zip(beliefs.columns, suited, strict=True)]
+    right = people.preferences.success.T[cell]
+    predicted = np.stack(
+        [
+            _noisy(np.prod(fit, axis=0)),
+            _noisy(_dot(beliefs.preferences, right)),
+            _cell_chances(beliefs.successes[runs, cell], beliefs.failures[runs, cell]),
+        ],
+        axis=1,
+    )
+    experts = beliefs.experts * np.where(success[:, None], predicted, 1 - predicted)
+    return Beliefs(
+        tuple(
+            _shared(w * _column_likelihood(s, fit, i, success), prior.columns[i], prior.change)
+            for i, (w, s) in enumerate(zip(beliefs.columns, suited, strict=True))
+        ),
+        _shared(beliefs.preferences * _likelihood(right, success), people.preferences.prior, prior.change),
+        _counted(beliefs.successes, runs, cell, success),
+        _counted(beliefs.failures, runs, cell, ~success),
+        _shared(experts, prior.experts, prior.change),
+    )
+
+
+# --- pieces ---
+
+
+def _noisy(right: Floats | float) -> Floats:
+    """Chance of success where ``right`` is the probability that the action is a right one."""
+    return np.asarray(LOW + (HIGH - LOW) * right)
+
+
+def _likelihood(right: Floats, success: Bools) -> Floats:
+    """Of the result, for each hypothesis: [runs, hypotheses]."""
+    chance = _noisy(right)
+    return np.where(success[:, None], chance, 1 - chance)
+
+
+def _column_likelihood(suited: Floats, fit: list[Floats], own: int, success: Bools) -> Floats:
+    """Of the result, for each column of strategy ``own``, the other strategies as expected."""
+    others = np.ones(len(success))
+    for s, probability in enumerate(fit):
+        if s != own:
+            others = others * probability
+    return _likelihood(suited * others[:, None], success)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    total: Floats = (a * b).sum(axis=1)
+    return total
+
+
+def _shared(weights: Floats, prior: Floats, change: float) -> Floats:
+    """Normalised, and a share given back to the prior."""
+    shared: Floats = weights * ((1 - change) / weights.sum(axis=1, keepdims=True)) + change * prior
+    return shared
+
+
+def _cell_chances(successes: Floats, failures: Floats) -> Floats:
+    return (successes + CELL_SUCCESS) / (successes + failures + (CELL_SUCCESS + CELL_FAILURE))
+
+
+def _counted(counts: Floats, runs: Ints, cell: Ints, more: Bools) -> Floats:
+    after = counts * CELL_MEMORY
+    after[runs, cell] += more
+    return after

@@ -1,0 +1,129 @@
+"""The exact optimum for a simulated user: finite-horizon dynamic programming by someone who knows the user.
+
+Pure. The state is all that matters to the future: the capacity that is shown (and the true one, where it
+differs), the previous action, the gaze class, the awareness of every task, and the time left. Tasks are alike, so
+awareness counts how many of them are unknown, failed and done (window 1: the simulated outcomes of both
+dimensions are one, so the other two classes do not occur). The values that capacity can take are enumerated, not
+put on a grid. The reward's expectation over durations and coin flips is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from shift_schemas.errors import InvalidSettings
+from shift_schemas.study import CapacitySettings, Study
+from shift_schemas.words import AWARENESSES, GAZES
+
+from shift_simulator.draws import Floats, Ints
+from shift_simulator.dynamics import FAILURE, FOCUSED, MARGIN, SUCCESS, check_simulable, costs, rewards
+from shift_simulator.users import ACTIONS, DEVIATION, User, true_capacity
+
+UNKNOWN = AWARENESSES.index("unknown")
+SEEN = (UNKNOWN, FAILURE, SUCCESS)
+"""The awareness classes that occur, in the order of the counts."""
+MOST_STATES = 2_000_000
+"""Chosen: of capacities, actions, gaze and awareness together; four minutes and 200 MB at most."""
+
+Counts = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Batteries:
+    """The reachable (shown, true) capacities with the previous action, as a graph; 0 is the start."""
+
+    after: NDArray[np.int64]
+    """[batteries, actions]: the battery after an action."""
+    shown_high: Ints
+    true_high: Ints
+
+
+def optimum(user: User, study: Study, episodes: int) -> float:
+    """The largest expected cumulative reward that any policy can have with this user after ``episodes``.
+
+    Raises :class:`InvalidSettings` where its states are too many to enumerate.
+    """
+    check_simulable(study)
+    batteries = _batteries(user, study)
+    counts = _counts(user.tasks)
+    if len(batteries.after) * len(GAZES) * len(counts) > MOST_STATES:
+        raise InvalidSettings(f"user {user.user} has too many states for the exact optimum; ask without --regret")
+    scale = float(rewards(study.reward)[1].mean())
+    value = np.zeros((len(batteries.after), len(GAZES), len(counts)))
+    for n in range(episodes, 0, -1):
+        value = _backed_up(value, user, n, batteries, counts, scale)
+    return float(value[0, FOCUSED, counts.index((user.tasks, 0, 0))])
+
+
+def _backed_up(value: Floats, user: User, n: int, batteries: Batteries, counts: list[Counts], scale: float) -> Floats:
+    """The value before interaction ``n`` from the value after it, [batteries, gaze, counts].
+
+    The value before is taken over the task that is drawn: each class in proportion to its count.
+    """
+    following = user.gaze.keep * value + (1 - user.gaze.keep) * value.mean(axis=1, keepdims=True)
+    chance = DEVIATION / 2 + (1 - DEVIATION) * user.table_at(n).reshape(2, len(GAZES), len(AWARENESSES), ACTIONS)
+    before = np.zeros_like(value)
+    for i, awareness in enumerate(SEEN):
+        p = chance[batteries.true_high][:, :, awareness, :]  # [batteries, gaze, actions]
+        drawn, succeeded, failed = _moves(counts, i)
+        best = np.full((len(value), len(GAZES), len(drawn)), -np.inf)
+        for action in range(ACTIONS):
+            then = following[batteries.after[:, action]]
+            chosen = p[:, :, action, None]
+            gain = chosen * (scale + then[:, :, succeeded]) + (1 - chosen) * (then[:, :, failed] - scale)
+            best = np.maximum(best, gain)
+        share = np.array([counts[k][i] for k in drawn]) / sum(counts[0])
+        before[:, :, drawn] += share * best
+    return before
+
+
+def _moves(counts: list[Counts], i: int) -> tuple[Ints, Ints, Ints]:
+    """Counts where a task of class ``i`` can be drawn, and the counts after its success and its failure."""
+    drawn = [k for k, c in enumerate(counts) if c[i]]
+    moved = []
+    for to in (2, 1):
+        after = []
+        for k in drawn:
+            c = list(counts[k])
+            c[i] -= 1
+            c[to] += 1
+            after.append(counts.index((c[0], c[1], c[2])))
+        moved.append(np.array(after))
+    return np.array(drawn), moved[0], moved[1]
+
+
+def _counts(tasks: int) -> list[Counts]:
+    """How many tasks can be unknown, failed, done."""
+    return [(u, f, tasks - u - f) for u, f in product(range(tasks + 1), repeat=2) if u + f <= tasks]
+
+
+def _batteries(user: User, study: Study) -> Batteries:
+    """Walk all actions from the start until nothing new comes up; values that differ by rounding are one."""
+    both = (study.capacity, true_capacity(user, study))
+    cost = [costs(settings, study) for settings in both]
+    found: dict[tuple[float, float, int], int] = {(both[0].start, both[1].start, -1): 0}
+    queue, after = list(found), []
+    for shown, true, previous in queue:
+        row = []
+        for action in range(ACTIONS):
+            values = [
+                _executed(v, s, float(c[action]), action == previous)
+                for v, s, c in zip((shown, true), both, cost, strict=True)
+            ]
+            key = (round(values[0], 9), round(values[1], 9), action)
+            if key not in found:
+                found[key] = len(found)
+                queue.append(key)
+            row.append(found[key])
+        after.append(row)
+        if len(found) > MOST_STATES // len(GAZES):
+            raise InvalidSettings(f"user {user.user} has too many capacities for the exact optimum")
+    high = [np.array([int(k[i] >= s.threshold - MARGIN) for k in queue]) for i, s in enumerate(both)]
+    return Batteries(np.array(after), high[0], high[1])
+
+
+def _executed(value: float, settings: CapacitySettings, cost: float, repeated: bool) -> float:
+    return min(value + settings.recovery, settings.max) if repeated else max(value - cost, settings.min)
