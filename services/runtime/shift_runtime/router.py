@@ -13,7 +13,7 @@ import threading
 import zenoh
 
 from shift_runtime.settings import DEFAULT_ROUTER
-from shift_runtime.zenoh_bus import zenoh_config
+from shift_runtime.zenoh_config import zenoh_config
 
 
 def main() -> None:

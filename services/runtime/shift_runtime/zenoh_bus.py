@@ -9,7 +9,6 @@ Measured (DESIGN.md): 122 us a request that way, 365 us with the default callbac
 from __future__ import annotations
 
 import asyncio
-import json
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,28 +18,9 @@ import zenoh
 from zenoh.handlers import Callback
 
 from shift_runtime.bus import Handle, Incoming, Reply, Request
+from shift_runtime.zenoh_config import zenoh_config
 
 T = TypeVar("T")
-
-
-def zenoh_config(mode: str, *, connect: str = "", listen: str = "") -> zenoh.Config:
-    """A configuration without any scouting; ``mode`` is peer, client or router."""
-    config = zenoh.Config()
-    entries: dict[str, Any] = {
-        "mode": mode,
-        "connect/endpoints": [connect] if connect else [],
-        "connect/timeout_ms": -1,
-        "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
-        "listen/endpoints": [listen] if listen else [],
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": True,
-        "open/return_conditions/connect_scouted": False,
-        "open/return_conditions/declares": False,
-    }
-    for key, value in entries.items():
-        config.insert_json5(key, json.dumps(value))
-    return config
 
 
 class _Gate:

@@ -1,0 +1,66 @@
+"""``python -m shift_runtime.healthcheck SERVICE``: exit code 0 where the service answers and is ready.
+
+For containers, every few seconds, so it imports little: Zenoh and the standard library. A service is asked
+over Zenoh, through its worker's own loop; the gateway by ``/readyz``; the router by a connection.
+"""
+
+from __future__ import annotations
+
+import http.client
+import json
+import os
+import socket
+import sys
+
+TIMEOUT_S = 2.0
+
+
+def main(arguments: list[str]) -> int:
+    """The exit code for ``[service]``; 2 for wrong use."""
+    if len(arguments) != 1:
+        sys.stderr.write("give one service: router, gateway, recorder, monitor, decider or learner\n")
+        return 2
+    checks = {"router": _router, "gateway": _gateway}
+    try:
+        healthy = checks[arguments[0]]() if arguments[0] in checks else _service(arguments[0])
+    except OSError as e:
+        sys.stderr.write(f"{arguments[0]}: {e}\n")
+        return 1
+    return 0 if healthy else 1
+
+
+def _router() -> bool:
+    listen = os.environ.get("SHIFT_ROUTER_LISTEN", "tcp/127.0.0.1:7447")
+    host, _, port = listen.partition("/")[2].rpartition(":")
+    with socket.create_connection(("127.0.0.1" if host == "0.0.0.0" else host.strip("[]"), int(port)), TIMEOUT_S):
+        return True
+
+
+def _gateway() -> bool:
+    connection = http.client.HTTPConnection("127.0.0.1", int(os.environ.get("SHIFT_PORT", "8080")), timeout=TIMEOUT_S)
+    connection.request("GET", "/readyz")
+    return connection.getresponse().status == 200
+
+
+def _service(name: str) -> bool:
+    import zenoh
+
+    from shift_runtime.zenoh_config import zenoh_config
+
+    config = zenoh_config("client", connect=os.environ.get("SHIFT_ZENOH", "tcp/127.0.0.1:7447"), timeout_ms=2000)
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as e:
+        sys.stderr.write(f"{name}: {e}\n")
+        return False
+    try:
+        for reply in session.get(f"shift/v1/@service/{name}/health", timeout=TIMEOUT_S):
+            if reply.ok is not None:
+                return bool(json.loads(reply.ok.payload.to_bytes()).get("ready"))
+    finally:
+        session.close()  # type: ignore[no-untyped-call]
+    return False
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,31 @@
+"""How Zenoh is configured here: explicit endpoints and gossip, no multicast, quick to connect again."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import zenoh
+
+
+def zenoh_config(mode: str, *, connect: str = "", listen: str = "", timeout_ms: int = -1) -> zenoh.Config:
+    """A configuration without any scouting; ``mode`` is peer, client or router.
+
+    ``timeout_ms`` is how long to try to connect at the start; -1 is for ever, for a peer in the background.
+    """
+    config = zenoh.Config()
+    entries: dict[str, Any] = {
+        "mode": mode,
+        "connect/endpoints": [connect] if connect else [],
+        "connect/timeout_ms": timeout_ms,
+        "connect/exit_on_failure": False,
+        "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
+        "listen/endpoints": [listen] if listen else [],
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/enabled": True,
+        "open/return_conditions/connect_scouted": False,
+        "open/return_conditions/declares": False,
+    }
+    for key, value in entries.items():
+        config.insert_json5(key, json.dumps(value))
+    return config
