@@ -20,12 +20,13 @@ from pathlib import Path
 from typing import Any
 
 import structlog
+from shift_runtime.bus import Incoming
 from shift_runtime.journal import Batch
 from shift_runtime.reader import ReadFact
 from shift_runtime.settings import MeshSettings
 from shift_runtime.worker import Asked, Core, Worker, _Turn
-from shift_schemas.errors import DamagedRecording, ShiftError, Unavailable
-from shift_schemas.keys import READS
+from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, Unavailable
+from shift_schemas.keys import READS, ROOT, FactKey, StreamKey, parse_key
 from shift_schemas.messages import Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
 from shift_schemas.study_text import study_from_json
 
@@ -82,11 +83,21 @@ class RecorderWorker(Worker[RecorderState]):
 
     async def on_start(self) -> None:
         """Go on with ends that a crash interrupted, and flush from time to time."""
+        self.bus.subscribe(f"{ROOT}/**", self._stray)
         for session, closed in list(self.journal.sessions()):
             state = None if closed else self._state(session)
             if state is not None and state.fact.state == "ending":
                 self._begin_end(session)
         self._later()
+
+    def _stray(self, incoming: Incoming) -> None:
+        """What is published where nobody listens is counted here: no key of the mesh, a command, a service's door."""
+        try:
+            key = parse_key(incoming.key)
+        except MalformedMessage:
+            key = None
+        if not isinstance(key, FactKey | StreamKey):
+            self.metrics.dropped("malformed")
 
     def _later(self) -> None:
         asyncio.get_running_loop().call_later(FLUSH_EVERY_S, self._tick)

@@ -13,8 +13,10 @@ T = TypeVar("T")
 
 
 def matches(expression: str, key: str) -> bool:
-    """Whether a key expression (``*`` is any one part) takes in ``key``."""
+    """Whether a key expression (``*`` is any one part, ``**`` at its end any rest) takes in ``key``."""
     parts, wanted = key.split("/"), expression.split("/")
+    if wanted[-1] == "**":
+        wanted = wanted[:-1] + ["*"] * (len(parts) - len(wanted) + 1)
     return len(parts) == len(wanted) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=True))
 
 
