@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from shift_learner.learner import Context
 from shift_schemas.study import Study
-from shift_schemas.words import LearnerName
 
 from shift_simulator.batch import batch_learner
 from shift_simulator.draws import Floats, session_seeds
@@ -23,7 +22,7 @@ Progress = Callable[[str], None]
 
 
 def compare(
-    names: Sequence[LearnerName], people: Sequence[User], seed: int, runs: int, regret: bool, said: Progress
+    names: Sequence[str], people: Sequence[User], seed: int, runs: int, regret: bool, said: Progress
 ) -> dict[str, Any]:
     """Every learner on every user, all on the same sessions (INTERFACE.md, "Command line").
 
@@ -41,7 +40,7 @@ def compare(
     return {"seed": seed, "runs": runs, "results": results, "curves": curves}
 
 
-def rewards_of(name: LearnerName, user: User, seed: int, runs: int, episodes: int = EPISODES) -> Floats:
+def rewards_of(name: str, user: User, seed: int, runs: int, episodes: int = EPISODES) -> Floats:
     """Cumulative reward [episodes, runs] of a learner with its default settings."""
     study = Study.model_validate({"study": "learners", "learner": {"name": name}})
     learner = batch_learner(Context(study), runs)
