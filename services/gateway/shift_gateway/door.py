@@ -1,4 +1,4 @@
-"""The door: what the REST paths do, without HTTP. It remembers what it answered.
+"""The gateway's door: what the REST paths do, without HTTP. To the commands it adds the reads and the preview.
 
 Each method takes what a request says and gives what is said back; errors are the error tree's.
 """
@@ -6,152 +6,27 @@ Each method takes what a request says and gives what is said back; errors are th
 from __future__ import annotations
 
 import json
-import secrets
-from functools import partial
 from typing import Any
 
 from shift_decider.core import ANY_TASK, decided
 from shift_runtime.clock import Clock
+from shift_runtime.door import READ_WAIT_S, CommandDoor
 from shift_runtime.mesh_client import MeshClient
-from shift_schemas.errors import Unavailable, UnknownThing
-from shift_schemas.messages import (
-    Answer,
-    Command,
-    Configure,
-    Decide,
-    EndSession,
-    GazeChunk,
-    Mark,
-    Observation,
-    ReportPerformance,
-    Seen,
-    Session,
-    SetOverride,
-    StartSession,
-)
-from shift_schemas.step import NotYet, covers, merged_seen
+from shift_schemas.errors import Unavailable
+from shift_schemas.messages import Observation, Seen, Session
+from shift_schemas.step import NotYet, covers
 
-from shift_gateway.bodies import DecisionBody, MarkerBody, OverrideBody, PerformanceBody, StartBody
-from shift_gateway.replica import Replica, View
+from shift_gateway.replica import Replica, View, decider_state
 
-READ_WAIT_S = 2.0
-"""How long a read waits for what it must have in it, at least; a study's ``wait_s`` can make it longer."""
-START_ID, END_ID = "start", "end"
 PREVIEW_ID = "preview"
 
 
-def new_id(prefix: str) -> str:
-    """An id that nobody else has."""
-    return f"{prefix}{secrets.token_hex(8)}"
-
-
-class Door:
+class Door(CommandDoor):
     """See the module."""
 
     def __init__(self, mesh: MeshClient, replica: Replica, clock: Clock) -> None:
-        self.mesh = mesh
-        self.replica = replica
+        super().__init__(mesh, replica)
         self.clock = clock
-
-    # --- commands ---
-
-    async def start(self, body: StartBody) -> tuple[dict[str, Any], bool]:
-        """Begin a session; the answer, and whether it is a repeat's."""
-        session = body.session or new_id("s-")
-        command = StartSession(
-            command_id=START_ID, session=session, participant=body.participant, study=body.study,
-            seed=body.seed, condition=body.condition,
-        )  # fmt: skip
-        answer = await self.mesh.command(command)
-        await self.replica.view(session)
-        self._remember(session, answer, Seen(config=1))
-        return answer.result, answer.repeat
-
-    async def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
-        """Hand gaze to the monitor; acknowledged once it is in the journal."""
-        await self.replica.view(session)
-        answer = await self.mesh.gaze(session, chunk)
-        self._remember(session, answer, Seen(gaze={chunk.source: chunk.seq}))
-        return {"accepted": answer.result["accepted"]}
-
-    async def decide(self, session: str, body: DecisionBody) -> tuple[dict[str, Any], bool]:
-        """The next decision."""
-        view = await self.replica.view(session)
-        command_id = body.decision_id or new_id("d-")
-        command = Decide(command_id=command_id, session=session, task=body.task, need=view.need)
-        answer = await self.mesh.command(command, wait_s=await self._wait_s(view))
-        self._remember(session, answer, Seen(decision=answer.result["n"]))
-        return answer.result, answer.repeat
-
-    async def report(self, session: str, body: PerformanceBody) -> tuple[dict[str, Any], bool]:
-        """How the task went."""
-        view = await self.replica.view(session)
-        if view.fact.state != "ended":
-            await self._check_decision(session, view, body.decision_id)
-        command = ReportPerformance(
-            command_id=body.decision_id, session=session, need=view.need,
-            comprehension=body.comprehension, enabledness=body.enabledness,
-        )  # fmt: skip
-        answer = await self.mesh.command(command, wait_s=READ_WAIT_S)
-        self._remember(session, answer, Seen(performance=answer.result["n"]))
-        result = dict(answer.result)
-        for dimension in ("comprehension", "enabledness"):
-            result[dimension] = result[dimension]["value"]
-        return result, answer.repeat
-
-    async def override(self, session: str, body: OverrideBody) -> tuple[dict[str, Any], bool]:
-        """Choose the task's next strategy."""
-        view = await self.replica.view(session)
-        command = SetOverride(
-            command_id=body.override_id or new_id("o-"), session=session, need=view.need,
-            task=body.task, strategy=body.strategy, reason=body.reason,
-        )  # fmt: skip
-        return await self._plain(session, command, await self._wait_s(view))
-
-    async def mark(self, session: str, body: MarkerBody) -> tuple[dict[str, Any], bool]:
-        """Note something."""
-        await self.replica.view(session)
-        return await self._plain(
-            session, Mark(command_id=body.marker_id or new_id("m-"), session=session, text=body.text)
-        )
-
-    async def configure(self, session: str, patch: dict[str, Any]) -> dict[str, Any]:
-        """Change the study in force."""
-        await self.replica.view(session)
-        answer = await self.mesh.command(Configure(command_id=new_id("c-"), session=session, patch=patch))
-        self._remember(session, answer, Seen(config=answer.result["version"]))
-        return answer.result
-
-    async def end(self, session: str) -> dict[str, Any]:
-        """End the session; answered once its recording is finished."""
-        await self.replica.view(session)
-        answer = await self.mesh.command(EndSession(command_id=END_ID, session=session), wait_s=10.0)
-        self._remember(session, answer, Seen())
-        return answer.result
-
-    async def _plain(self, session: str, command: Command, wait_s: float = 0.0) -> tuple[dict[str, Any], bool]:
-        answer = await self.mesh.command(command, wait_s)
-        self._remember(session, answer, Seen())
-        return answer.result, answer.repeat
-
-    def _remember(self, session: str, answer: Answer, seen: Seen) -> None:
-        view = self.replica.views.get(session)
-        if view is not None:
-            view.answered = merged_seen(view.answered, seen)
-            view.sequences[answer.owner] = max(view.sequences.get(answer.owner, 0), answer.seq)
-
-    async def _wait_s(self, view: View) -> float:
-        await self._read(view, ("recorder",))
-        return view.study.decider.wait_s
-
-    async def _check_decision(self, session: str, view: View, decision_id: str) -> None:
-        if decision_id not in view.decisions:
-            if not await self.replica.reader.pull("decider"):
-                raise Unavailable("the decider does not answer, so nobody knows whether there is such a decision")
-            if decision_id not in view.decisions:
-                raise UnknownThing(f"session {session} has no decision {decision_id}")
-
-    # --- reads ---
 
     async def session(self, session: str) -> dict[str, Any]:
         """The session, with counts so far."""
@@ -200,7 +75,7 @@ class Door:
 
         def attempt(late: bool) -> dict[str, Any] | None:
             try:
-                found = decided(view.decider_state(), task, PREVIEW_ID, view.need, self.clock.now(), late)
+                found = decided(decider_state(view), task, PREVIEW_ID, view.need, self.clock.now(), late)
             except NotYet:
                 return None
             return found.model_dump(mode="json", exclude={"decision_id"})
@@ -221,15 +96,6 @@ class Door:
             if silent:
                 raise Unavailable(f"the {silent[0]} does not answer")
         return view
-
-    async def _read(self, view: View, owners: tuple[str, ...]) -> None:
-        """Wait until what these owners answered through this door has been read back."""
-        session = view.fact.session
-        for owner in owners:
-            if not await self.replica.wait(
-                session, (owner,), partial(self.replica.has_read, session, owner), READ_WAIT_S
-            ):
-                raise Unavailable(f"the {owner} does not answer")
 
     async def _newest(self, view: View, owner: str, found: Any) -> Any:
         wait_s = max(READ_WAIT_S, view.study.decider.wait_s) if view.config else READ_WAIT_S

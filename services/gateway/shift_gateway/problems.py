@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from http import HTTPStatus
 from typing import Any, TypeVar
 
@@ -11,6 +10,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ValidationError
 from shift_schemas.errors import FieldError, MalformedMessage, Problem, ShiftError, TooLarge, malformed, shorten
 from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.strict_json import parse_json
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 BODY_LIMIT = 256 * 1024
@@ -46,31 +46,6 @@ def check_id(name: str, value: str) -> str:
 async def json_body(request: Request) -> Any:
     """The body as JSON. Raises :class:`MalformedMessage`, also for a key given twice."""
     return parse_json(await request.body())
-
-
-def parse_json(raw: bytes | str) -> Any:
-    """JSON without the liberties that Python takes: no NaN, no key twice, no bottomless nesting."""
-    try:
-        return json.loads(raw, object_pairs_hook=_once, parse_constant=_no_constant)
-    except (ValueError, RecursionError) as e:
-        rule = str(e) if isinstance(e, _Refused) else "the body must be JSON"
-        error = FieldError(field="body", value="", rule=rule)
-        raise MalformedMessage(f"body: {rule}", (error,)) from e
-
-
-class _Refused(ValueError):
-    pass
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) != len(pairs):
-        raise _Refused("a key is given twice")
-    return found
-
-
-def _no_constant(name: str) -> Any:
-    raise _Refused(f"{name} is no number in JSON")
 
 
 async def body(request: Request, kind: type[M]) -> M:

@@ -1,0 +1,33 @@
+"""JSON without the liberties that Python takes: no NaN, no key twice, no bottomless nesting. Pure."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from shift_schemas.errors import FieldError, MalformedMessage
+
+
+def parse_json(raw: bytes | str) -> Any:
+    """What ``raw`` says. Raises :class:`MalformedMessage` with the rule that it breaks."""
+    try:
+        return json.loads(raw, object_pairs_hook=_once, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as e:
+        rule = str(e) if isinstance(e, _Refused) else "the body must be JSON"
+        error = FieldError(field="body", value="", rule=rule)
+        raise MalformedMessage(f"body: {rule}", (error,)) from e
+
+
+class _Refused(ValueError):
+    pass
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) != len(pairs):
+        raise _Refused("a key is given twice")
+    return found
+
+
+def _no_constant(name: str) -> Any:
+    raise _Refused(f"{name} is no number in JSON")
