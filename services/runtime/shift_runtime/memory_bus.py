@@ -60,7 +60,6 @@ class MemoryBus:
     def __init__(self, hub: Hub) -> None:
         self._hub = hub
         self._handles: list[_Handle] = []
-        self._waiting = 0
         self._dropped = 0
 
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
@@ -124,16 +123,19 @@ class MemoryBus:
     def _later(self, handler: Callable[[T], None], limit: int) -> Callable[[T], None]:
         """The handler, to be run by the loop in its own time, as from a network."""
         loop = asyncio.get_running_loop()
+        waiting = 0
 
         def run(item: T) -> None:
-            self._waiting -= 1
+            nonlocal waiting
+            waiting -= 1
             handler(item)
 
         def enqueue(item: T) -> None:
-            if self._waiting >= limit:
+            nonlocal waiting
+            if waiting >= limit:
                 self._dropped += 1
                 return
-            self._waiting += 1
+            waiting += 1
             loop.call_soon(run, item)
 
         return enqueue

@@ -9,18 +9,23 @@ Measured (DESIGN.md): 122 us a request that way, 365 us with the default callbac
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import zenoh
+from shift_schemas.errors import InvalidSettings
 from zenoh.handlers import Callback
 
 from shift_runtime.bus import Handle, Incoming, Reply, Request
 from shift_runtime.zenoh_config import zenoh_config
 
 T = TypeVar("T")
+
+NO_REPLY = (b"", b"Timeout")
+"""What Zenoh itself puts in the place of a reply that did not come in time."""
 
 
 class _Gate:
@@ -98,9 +103,19 @@ class ZenohBus:
 
     @classmethod
     async def open(cls, connect: str, listen: str = "") -> ZenohBus:
-        """Open a session. A router that is not there yet is tried again in the background."""
+        """Open a session. A router that is not there yet is tried again in the background.
+
+        Raises
+        ------
+        InvalidSettings
+            An endpoint is none, or cannot be listened on.
+        """
         mode = "peer" if listen else "client"
-        session = await asyncio.to_thread(zenoh.open, zenoh_config(mode, connect=connect, listen=listen))
+        try:
+            session = await asyncio.to_thread(zenoh.open, zenoh_config(mode, connect=connect, listen=listen))
+        except zenoh.ZError as e:
+            said = str(e).partition(" at /")[0]
+            raise InvalidSettings(f"SHIFT_ZENOH is {connect!r}, SHIFT_LISTEN is {listen!r}: {said}") from e
         return cls(session, asyncio.get_running_loop())
 
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
@@ -121,8 +136,8 @@ class ZenohBus:
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 replies.append(Reply(True, reply.ok.payload.to_bytes()))
-            elif reply.err is not None and reply.err.payload:
-                replies.append(Reply(False, reply.err.payload.to_bytes()))
+            elif reply.err is not None and (said := reply.err.payload.to_bytes()) not in NO_REPLY:
+                replies.append(Reply(False, said))
 
         def on_end() -> None:
             try:
@@ -138,11 +153,9 @@ class ZenohBus:
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        try:
+        with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(done.wait(), timeout_s + 0.5)
-        except TimeoutError:
-            return []
-        return replies
+        return list(replies)
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
         """See :class:`~shift_runtime.bus.Bus`."""

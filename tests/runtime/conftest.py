@@ -1,0 +1,51 @@
+"""A router of its own for the buses of a test, and buses of both kinds."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+
+import pytest
+import zenoh
+from runtime_fixtures import free_endpoint
+from shift_runtime.bus import Bus
+from shift_runtime.memory_bus import Hub, MemoryBus
+from shift_runtime.zenoh_bus import ZenohBus
+from shift_runtime.zenoh_config import zenoh_config
+
+OpenBus = Callable[[], Awaitable[Bus]]
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    """The services run on asyncio."""
+    return "asyncio"
+
+
+@pytest.fixture(scope="session")
+def router() -> Iterator[str]:
+    """The endpoint of a Zenoh router in this process."""
+    endpoint = free_endpoint()
+    session = zenoh.open(zenoh_config("router", listen=endpoint))
+    yield endpoint
+    session.close()
+
+
+@pytest.fixture(params=["memory", "zenoh"])
+async def open_bus(request: pytest.FixtureRequest) -> AsyncIterator[OpenBus]:
+    """Opens participants of one mesh; they are closed after the test."""
+    buses: list[Bus] = []
+    hub = Hub()
+
+    async def memory() -> Bus:
+        buses.append(MemoryBus(hub))
+        return buses[-1]
+
+    async def over_zenoh() -> Bus:
+        buses.append(await ZenohBus.open(request.getfixturevalue("router"), "tcp/127.0.0.1:0"))
+        return buses[-1]
+
+    if request.param == "zenoh":
+        request.getfixturevalue("router")
+    yield memory if request.param == "memory" else over_zenoh
+    for bus in buses:
+        await bus.close()
