@@ -53,3 +53,8 @@ def test_session_seeds_are_addressed_and_fit_into_a_double() -> None:
     assert seeds.tolist() == [int(uniform(7, run, SESSION) * 2**53) for run in range(50)]
     assert len(set(seeds.tolist())) == 50
     assert seeds.max() < 2**53
+
+
+@pytest.mark.parametrize("learner", ["epsilon-greedy", "ucb1", "thompson", "linear-thompson"])
+def test_every_other_learner_agrees_as_well(learner: str) -> None:
+    check_agreement(paper_user("C"), Study.model_validate({"study": "s", "learner": {"name": learner}}), 1, 25)

@@ -5,11 +5,26 @@ from __future__ import annotations
 from shift_schemas.errors import InvalidStudy
 
 from shift_learner.learner import Learner
+from shift_learner.learners.epsilon_greedy import EpsilonGreedy
+from shift_learner.learners.linear_thompson import LinearThompson
 from shift_learner.learners.planner import Planner
 from shift_learner.learners.q_learning import QLearning
 from shift_learner.learners.scoring import Scoring
+from shift_learner.learners.thompson import Thompson
+from shift_learner.learners.ucb1 import Ucb1
 
-LEARNERS: dict[str, Learner] = {learner.name: learner for learner in (Scoring(), QLearning(), Planner())}
+LEARNERS: dict[str, Learner] = {
+    learner.name: learner
+    for learner in (
+        Scoring(),
+        QLearning(),
+        EpsilonGreedy(),
+        Ucb1(),
+        Thompson(),
+        LinearThompson(),
+        Planner(),
+    )
+}
 
 
 def learner_named(name: str) -> Learner:
