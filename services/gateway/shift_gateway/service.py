@@ -10,6 +10,7 @@ import uvicorn
 from shift_runtime.bus import Bus
 from shift_runtime.clock import SystemClock
 from shift_runtime.logs import configure_logs
+from shift_runtime.process import leave
 from shift_runtime.settings import read_settings
 from shift_runtime.zenoh_bus import ZenohBus
 from shift_schemas.errors import ShiftError
@@ -44,3 +45,4 @@ def run_gateway() -> None:
         timeout_graceful_shutdown=GRACE_S, ws_max_size=256 * 1024, server_header=False,
     )  # fmt: skip
     log.info("stopped")
+    leave()

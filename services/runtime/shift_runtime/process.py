@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import signal
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NoReturn
 
 import structlog
 from shift_schemas.errors import ShiftError
@@ -32,6 +33,14 @@ def run_service(core: Core[Any], kind: WorkerKind = Worker) -> None:
     except ShiftError as e:
         sys.stderr.write(f"shift_{core.name}: {e.detail}\n")
         sys.exit(2)
+    leave()
+
+
+def leave() -> NoReturn:
+    """End the process, all being done: a Zenoh session that could not be closed would hold it for ever."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
 
 
 async def serve(core: Core[Any], settings: MeshSettings, kind: WorkerKind = Worker) -> None:
