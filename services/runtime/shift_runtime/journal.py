@@ -11,6 +11,7 @@ import hashlib
 import json
 import sqlite3
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -121,17 +122,34 @@ class Journal:
         Unavailable
             The disk is full or broken; nothing of the batch happened.
         """
+        with self._transaction():
+            self._write(batch)
+        for row in batch.rows:
+            self.heads[row.session] = row.seq
+        self._closed |= batch.closed
+
+    def check(self) -> None:
+        """Find out whether the disk takes commits, by one that changes nothing of what is kept.
+
+        Raises
+        ------
+        Unavailable
+            It does not.
+        """
+        with self._transaction():
+            (number,) = self._db.execute("PRAGMA user_version").fetchone()
+            self._db.execute(f"PRAGMA user_version = {(number + 1) % 2**31}")
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
         try:
             self._db.execute("BEGIN IMMEDIATE")
-            self._write(batch)
+            yield
             self._db.execute("COMMIT")
         except sqlite3.Error as e:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
             raise Unavailable(f"the {self.owner} cannot write its journal {self.path.name}: {e}") from e
-        for row in batch.rows:
-            self.heads[row.session] = row.seq
-        self._closed |= batch.closed
 
     def _write(self, batch: Batch) -> None:
         db = self._db

@@ -78,8 +78,8 @@ class MemoryBus:
                 waiting.append(future)
         if not waiting:
             return []
-        done, _ = await asyncio.wait(waiting, timeout=timeout_s)
-        return [f.result() for f in done]
+        await asyncio.wait(waiting, timeout=timeout_s)
+        return [f.result() for f in waiting if f.done()]
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
         """See :class:`~shift_runtime.bus.Bus`."""

@@ -20,6 +20,8 @@ from shift_runtime.bus import Bus, Incoming
 
 PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
+REPLAY_MARK = b"replay:"
+"""Before the sequence of what is replayed: tools that listen hear it, a reader passes over it."""
 
 
 @dataclass(frozen=True)
@@ -89,17 +91,20 @@ class Reader:
             key = parse_key(incoming.key)
             if not isinstance(key, FactKey):
                 raise MalformedMessage(f"{incoming.key} is no fact's key")
-            if not incoming.attachment.isdigit() or len(incoming.attachment) > 15:
+            number = incoming.attachment.removeprefix(REPLAY_MARK)
+            if not number.isdigit() or len(number) > 15:
                 raise MalformedMessage(f"a {key.subject} without a sequence")
             row = OutboxRow(
                 session=key.session,
-                seq=int(incoming.attachment),
+                seq=int(number),
                 subject=key.subject,
                 payload=incoming.payload.decode(),
             )
             fact = fact_of(row)
         except (MalformedMessage, UnicodeDecodeError, ValueError):
             self.dropped("malformed")
+            return
+        if incoming.attachment.startswith(REPLAY_MARK):
             return
         owner = OWNER_OF[key.subject]
         if owner not in self.owners or row.session in self.done:
@@ -145,27 +150,35 @@ class Reader:
                 return answered
 
     async def _pull(self, owner: str, session: str | None) -> bool:
+        past: dict[str, int] = {}
+        """Heads of sessions that are done: an owner that has not closed them offers them from their start."""
         while True:
+            cursors = {s: n for (s, o), n in self.cursors.items() if o == owner and session in (None, s)}
             query = OutboxQuery(
-                cursors={s: n for (s, o), n in self.cursors.items() if o == owner and session in (None, s)},
+                cursors=cursors | past,
                 only=None if session is None else [session],
                 closed=self.closed and owner == "recorder",
             )
             page = await self._page(owner, query)
-            if page is None:
+            if page is None or not self._taken(owner, page):
                 return False
-            try:
-                for row in page.rows:
-                    self._take(owner, row)
-            except MalformedMessage:
-                self.dropped("malformed")
-                return False
+            past |= {s: n for s, n in page.heads.items() if s in self.done}
             if session is not None:
                 self.pages[f"{owner}/{session}"] = page
             if page.complete:
                 if session is None:
                     self.synced.add(owner)
                 return True
+
+    def _taken(self, owner: str, page: OutboxPage) -> bool:
+        """Take a page in; whether all of it is. What its reader holds back is asked for later, not again and again."""
+        try:
+            for row in page.rows:
+                self._take(owner, row)
+        except MalformedMessage:
+            self.dropped("malformed")
+            return False
+        return all(r.session in self.done or self.cursors.get((r.session, owner), 0) >= r.seq for r in page.rows)
 
     async def _page(self, owner: str, query: OutboxQuery) -> OutboxPage | None:
         key = build_key(ServiceKey(owner, "outbox"))

@@ -1,0 +1,430 @@
+"""The reader: exactly cursor + 1, whatever becomes of the hints and of the owner."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Coroutine
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from runtime_fixtures import marker, row, until
+from shift_runtime import reader as reader_module
+from shift_runtime.bus import Bus, Handle, Request
+from shift_runtime.memory_bus import Hub, MemoryBus
+from shift_runtime.reader import Reader, ReadFact, fact_of
+from shift_schemas.codec import decode, encode
+from shift_schemas.errors import MalformedMessage
+from shift_schemas.keys import FactKey, ServiceKey, build_key
+from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
+
+OUTBOX = build_key(ServiceKey("recorder", "outbox"))
+
+
+@dataclass
+class Owner:
+    """Puts out markers as the recorder does, with pages of ``most`` rows. It can die and come back."""
+
+    bus: Bus
+    most: int = 3
+    rows: dict[str, list[OutboxRow]] = field(default_factory=dict)
+    asked: list[OutboxQuery] = field(default_factory=list)
+    _served: Handle | None = None
+
+    def live(self) -> Owner:
+        self._served = self.bus.serve(OUTBOX, self._page)
+        return self
+
+    def die(self) -> None:
+        assert self._served is not None
+        self._served.close()
+
+    def commit(self, count: int, session: str = "s1") -> None:
+        rows = self.rows.setdefault(session, [])
+        rows += [row(len(rows) + 1 + i, session) for i in range(count)]
+
+    def hint(self, seq: int, session: str = "s1") -> None:
+        found = self.rows[session][seq - 1]
+        self.bus.put(build_key(FactKey(session, "marker")), found.payload.encode(), attachment=str(seq).encode())
+
+    def _page(self, request: Request) -> None:
+        query = decode(OutboxQuery, request.payload)
+        self.asked.append(query)
+        wanted = self.rows if query.only is None else {s: self.rows.get(s, []) for s in query.only}
+        rows = list(itertools.chain.from_iterable(found[query.cursors.get(s, 0) :] for s, found in wanted.items()))
+        heads = {s: len(found) for s, found in wanted.items()}
+        page = OutboxPage(owner="recorder", rows=rows[: self.most], heads=heads, complete=len(rows) < self.most)
+        request.reply(encode(page))
+
+
+@dataclass
+class Reading:
+    """A reader of one owner, and what it delivered."""
+
+    bus: Bus
+    cursors: dict[tuple[str, str], int] = field(default_factory=dict)
+    done: set[str] = field(default_factory=set)
+    found: list[ReadFact] = field(default_factory=list)
+    dropped: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.reader = Reader(
+            self.bus, ("recorder",), self.cursors, self.found.append, self.dropped.append, done=self.done
+        )
+        self.reader.start()
+
+    def sequence(self, session: str = "s1") -> list[int]:
+        return [read.seq for read in self.found if read.fact.session == session]
+
+
+async def read_up() -> tuple[Owner, Reading]:
+    bus = MemoryBus(Hub())
+    return Owner(bus).live(), Reading(bus)
+
+
+async def settled() -> None:
+    for _ in range(10):
+        await asyncio.sleep(0)
+
+
+def run(work: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(work)
+
+
+# --- hints ---
+
+
+def test_hints_in_their_order_are_delivered_without_a_single_pull() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(3)
+        for n in (1, 2, 3):
+            owner.hint(n)
+        await settled()
+        assert [(r.owner, r.seq, r.fact, r.payload) for r in reading.found] == [
+            ("recorder", n, marker(n), marker(n).model_dump_json()) for n in (1, 2, 3)
+        ]
+        assert owner.asked == []
+
+    run(test())
+
+
+def test_a_gap_is_pulled_at_once() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(8)
+        owner.hint(1)
+        owner.hint(8)
+        await until(lambda: reading.sequence() == list(range(1, 9)))
+        assert owner.asked[0].cursors == {"s1": 1}
+
+    run(test())
+
+
+def test_what_was_read_is_not_delivered_again() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(2)
+        for n in (1, 1, 2, 1, 2, 2):
+            owner.hint(n)
+        await settled()
+        await reading.reader.pull("recorder")
+        assert reading.sequence() == [1, 2]
+
+    run(test())
+
+
+def test_without_any_hint_a_pull_reads_page_by_page_to_the_end() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(7)
+        owner.commit(4, "s2")
+        assert await reading.reader.pull("recorder")
+        assert reading.sequence() == list(range(1, 8))
+        assert reading.sequence("s2") == [1, 2, 3, 4]
+        assert reading.reader.synced == {"recorder"}
+
+    run(test())
+
+
+def test_it_goes_on_where_its_cursor_says() -> None:
+    async def test() -> None:
+        bus = MemoryBus(Hub())
+        owner = Owner(bus).live()
+        reading = Reading(bus, cursors={("s1", "recorder"): 4})
+        owner.commit(6)
+        await reading.reader.pull("recorder")
+        assert reading.sequence() == [5, 6]
+
+    run(test())
+
+
+@pytest.mark.parametrize(
+    ("key", "payload", "attachment"),
+    [
+        ("shift/v1/s1/marker", marker(1).model_dump_json().encode(), b""),
+        ("shift/v1/s1/marker", marker(1).model_dump_json().encode(), b"one"),
+        ("shift/v1/s1/marker", marker(1).model_dump_json().encode(), b"-1"),
+        ("shift/v1/s1/marker", marker(1).model_dump_json().encode(), b"1" * 400),
+        ("shift/v1/s1/marker", marker(1, "s2").model_dump_json().encode(), b"1"),
+        ("shift/v1/s1/marker", b"", b"1"),
+        ("shift/v1/s1/marker", b"\xff\xfe\x00", b"1"),
+        ("shift/v1/s1/marker", b"[" * 100_000, b"1"),
+        ("shift/v1/s1/marker", b'{"session": "s1"}', b"1"),
+        ("shift/v1/s1/config", marker(1).model_dump_json().encode(), b"1"),
+        ("shift/v1/*/marker", marker(1).model_dump_json().encode(), b"1"),
+        ("shift/v1/-x/marker", marker(1).model_dump_json().encode(), b"1"),
+    ],
+)
+def test_a_hint_that_is_no_fact_is_counted_and_dropped(key: str, payload: bytes, attachment: bytes) -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(1)
+        owner.bus.put(key, payload, attachment=attachment)
+        await settled()
+        assert reading.found == []
+        assert reading.dropped == ["malformed"]
+        owner.hint(1)
+        await settled()
+        assert reading.sequence() == [1]
+
+    run(test())
+
+
+def test_a_sequence_of_0_is_never_the_next_one() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.bus.put("shift/v1/s1/marker", marker(1).model_dump_json().encode(), attachment=b"0")
+        await settled()
+        assert reading.found == []
+
+    run(test())
+
+
+def test_a_forgotten_session_is_read_no_more() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(2)
+        owner.hint(1)
+        await settled()
+        reading.reader.forget("s1")
+        owner.hint(2)
+        await settled()
+        assert await reading.reader.pull("recorder")
+        assert reading.sequence() == [1]
+
+    run(test())
+
+
+# --- pulls ---
+
+
+def test_an_owner_that_is_not_there_is_no_answer_and_nothing_is_lost() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(2)
+        owner.die()
+        assert not await reading.reader.pull("recorder")
+        assert await reading.reader.pull_all(("recorder", "monitor")) == ("recorder",)
+        assert reading.reader.synced == set()
+        owner.live()
+        assert await reading.reader.pull_all(("recorder",)) == ()
+        assert reading.sequence() == [1, 2]
+
+    run(test())
+
+
+def test_what_is_asked_for_during_a_pull_gets_one_more_after_it() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(1)
+        first = reading.reader.pull_soon("recorder")
+        await asyncio.sleep(0)
+        owner.commit(1)
+        assert [reading.reader.pull_soon("recorder") for _ in range(5)] == [first] * 5
+        await first
+        assert reading.sequence() == [1, 2]
+        assert len(owner.asked) == 2
+
+    run(test())
+
+
+def test_a_session_by_name_is_read_alone_and_its_page_kept() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(2)
+        owner.commit(2, "s2")
+        assert await reading.reader.pull("recorder", "s2")
+        assert reading.sequence() == []
+        assert reading.sequence("s2") == [1, 2]
+        assert reading.reader.pages["recorder/s2"].heads == {"s2": 2}
+        assert reading.reader.synced == set()
+
+    run(test())
+
+
+@pytest.mark.parametrize("page", [b"", b"{}", b"\xff", b"[" * 10_000, encode(marker(1))])
+def test_a_page_that_is_none_is_counted_and_another_answer_taken(page: bytes) -> None:
+    async def test() -> None:
+        bus = MemoryBus(Hub())
+        bus.serve(OUTBOX, lambda r: r.reply(page))
+        bus.serve(OUTBOX, lambda r: r.refuse(b"no"))
+        owner = Owner(bus).live()
+        owner.commit(2)
+        reading = Reading(bus)
+        assert await reading.reader.pull("recorder")
+        assert reading.sequence() == [1, 2]
+        assert reading.dropped == ["malformed"]
+
+    run(test())
+
+
+def test_a_row_that_is_no_fact_stops_the_reading_and_is_counted() -> None:
+    async def test() -> None:
+        owner, reading = await read_up()
+        owner.commit(3)
+        owner.rows["s1"][1] = owner.rows["s1"][1].model_copy(update={"payload": "{}"})
+        assert not await reading.reader.pull("recorder")
+        assert reading.sequence() == [1]
+        assert reading.dropped == ["malformed"]
+
+    run(test())
+
+
+@pytest.mark.parametrize(
+    "bad", [row(1).model_copy(update={"subject": "nonsense"}), row(1, "s2").model_copy(update={"session": "s1"})]
+)
+def test_a_row_of_no_subject_or_of_another_session_is_malformed(bad: OutboxRow) -> None:
+    with pytest.raises(MalformedMessage):
+        fact_of(bad)
+
+
+def test_a_pull_that_gets_nowhere_ends_instead_of_asking_without_pause() -> None:
+    async def test() -> None:
+        """Facts of a session that cannot be taken yet (the gateway's replica, before the recorder answers)."""
+        bus = MemoryBus(Hub())
+        owner = Owner(bus).live()
+        owner.commit(10)
+
+        def not_yet(read: ReadFact) -> None:
+            reader.cursors["s1", "recorder"] = 0
+
+        reader = Reader(bus, ("recorder",), {}, not_yet, lambda reason: None)
+        async with asyncio.timeout(2.0):
+            assert not await reader.pull("recorder")
+        assert len(owner.asked) == 1
+
+    run(test())
+
+
+def test_rows_of_a_session_that_is_done_do_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An owner that has not closed the session yet offers all of it again: it must not fill every page."""
+
+    async def test() -> None:
+        bus = MemoryBus(Hub())
+        owner = Owner(bus).live()
+        owner.commit(10, "s1")
+        reading = Reading(bus)
+        await reading.reader.pull("recorder")
+        reading.reader.forget("s1")
+        owner.commit(2, "s2")
+        async with asyncio.timeout(2.0):
+            assert await reading.reader.pull("recorder")
+        assert reading.sequence("s2") == [1, 2]
+        assert reading.sequence("s1") == list(range(1, 11))
+
+    run(test())
+
+
+def test_it_pulls_of_its_own_accord_from_time_to_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reader_module, "PULL_EVERY_S", 0.01)
+
+    async def test() -> None:
+        owner, reading = await read_up()
+        pulling = asyncio.create_task(reading.reader.run())
+        owner.commit(4)
+        await until(lambda: reading.sequence() == [1, 2, 3, 4])
+        owner.die()
+        owner.commit(1)
+        await asyncio.sleep(0.05)
+        owner.live()
+        await until(lambda: reading.sequence() == [1, 2, 3, 4, 5])
+        pulling.cancel()
+
+    run(test())
+
+
+# --- any interleaving ---
+
+EVENT = st.one_of(
+    st.tuples(st.just("commit"), st.integers(1, 4)),
+    st.tuples(st.just("hint"), st.integers(1, 40)),
+    st.tuples(st.just("junk"), st.sampled_from([b"", b"{}", b"\xff", b"null"])),
+    st.tuples(st.just("pull"), st.just(0)),
+    st.tuples(st.just("wait"), st.integers(1, 5)),
+    st.tuples(st.just("die"), st.just(0)),
+    st.tuples(st.just("live"), st.just(0)),
+    st.tuples(st.just("reader dies"), st.integers(0, 3)),
+)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    events=st.lists(st.tuples(st.sampled_from(["s1", "s2"]), EVENT), max_size=40),
+    most=st.integers(1, 5),
+)
+def test_any_interleaving_delivers_1_to_n_in_order_once(events: list[Any], most: int) -> None:
+    """Hints lost, doubled, late or malformed, pulls in between, the owner or the reader restarted at any point."""
+
+    async def test() -> None:
+        bus = MemoryBus(Hub())
+        owner = Owner(bus, most).live()
+        reading, alive = Reading(bus), True
+        delivered: dict[str, list[int]] = {"s1": [], "s2": []}
+
+        def keep(upto: int) -> None:
+            """What a reader that died had committed: all but the last ``upto`` that it was given."""
+            for session, sequence in delivered.items():
+                sequence += reading.sequence(session)
+                if upto:
+                    del sequence[-upto:]
+
+        for session, (kind, value) in events:
+            rows = owner.rows.setdefault(session, [])
+            match kind:
+                case "commit":
+                    owner.commit(value, session)
+                case "hint" if value <= len(rows):
+                    owner.hint(value, session)
+                case "junk":
+                    bus.put(build_key(FactKey(session, "marker")), value, attachment=str(len(rows) + 1).encode())
+                case "pull":
+                    reading.reader.pull_soon("recorder")
+                case "wait":
+                    for _ in range(value):
+                        await asyncio.sleep(0)
+                case "die" if alive:
+                    owner.die()
+                    alive = False
+                case "live" if not alive:
+                    owner.live()
+                    alive = True
+                case "reader dies":
+                    await settled()
+                    keep(value)
+                    await bus.close()
+                    if alive:
+                        owner.live()
+                    reading = Reading(bus, {(s, "recorder"): len(n) for s, n in delivered.items()})
+        if not alive:
+            owner.live()
+        await settled()
+        assert await reading.reader.pull("recorder")
+        keep(0)
+        for session, rows in owner.rows.items():
+            assert delivered[session] == list(range(1, len(rows) + 1))
+
+    run(test())
