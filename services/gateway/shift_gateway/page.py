@@ -32,7 +32,8 @@ curl -X POST ORIGIN/v1/sessions/s1/decisions -H 'Content-Type: application/json'
 const cell = (row, text, kind) => {
   const td = row.insertCell(); td.textContent = text ?? ''; if (kind) td.className = kind; };
 const fill = (id, rows) => { const body = document.getElementById(id); body.replaceChildren();
-  for (const cells of rows) { const row = body.insertRow(); for (const [text, kind] of cells) cell(row, text, kind); } };
+  for (const cells of rows) {
+    const row = body.insertRow(); for (const [text, kind] of cells) cell(row, text, kind); } };
 async function refresh() {
   try {
     const ready = await (await fetch('/readyz')).json();
