@@ -1,0 +1,110 @@
+"""The simulated partner as a Gymnasium environment: ``gymnasium.make("shift/Partner-v0", user="B")``.
+
+For agents from outside. Gymnasium is an optional extra. Importing this module registers the environment;
+``gymnasium.make("shift_simulator.env:shift/Partner-v0")`` does both at once.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from shift_schemas.scoring import suggestions
+from shift_schemas.study import Study
+from shift_schemas.words import TRIPLES
+
+from shift_simulator.draws import drawn
+from shift_simulator.dynamics import Partners
+from shift_simulator.users import ACTIONS, PAPER_USERS, User, paper_user, parse_user
+
+ENV_ID = "shift/Partner-v0"
+
+
+class PartnerEnv(gymnasium.Env[np.int64, np.int64]):
+    """A simulated partner who is explained tasks to.
+
+    ## Description
+    An agent chooses how each explanation is phrased; the partner succeeds with the task or fails. Capacity, gaze
+    and awareness move as in the paper's simulation (``dynamics``); the agent sees them as the decider does.
+
+    ## Action space
+    ``Discrete(6)``: (affirmation, none), (affirmation, hesitation), (negation+affirmation, none),
+    (negation+affirmation, hesitation), (negation, none), (negation, hesitation).
+
+    ## Observation space
+    ``Discrete(30)`` with ``observation="triples"``: 15 x capacity + 5 x gaze + awareness. ``Discrete(6)`` with
+    ``observation="states"``: the cognitive state, which is the scoring system's suggested action.
+
+    ## Rewards
+    The paper's: success (+1, -1) x exp(-0.1 T), the mean of both dimensions.
+
+    ## Starting state
+    High capacity, focused, nothing known of any task.
+
+    ## Episode end
+    Truncated after ``episodes`` interactions; it never terminates. ``info`` has the ``triple`` by its name and the
+    ``suggested`` action.
+
+    ## Arguments
+    ``user``: A, B, C, D, a user file's path or a ``User``; ``observation``; ``episodes``.
+    """
+
+    metadata = {"render_modes": []}  # noqa: RUF012 (Gymnasium's own attribute)
+
+    def __init__(
+        self,
+        user: str | User = "A",
+        observation: Literal["states", "triples"] = "triples",
+        episodes: int = 100,
+        render_mode: None = None,
+    ) -> None:
+        self.render_mode = render_mode
+        self._user = _user(user)
+        self._study = Study(study="gymnasium")
+        self._suggested = suggestions(self._study.scoring)
+        self._states = observation == "states"
+        self._episodes = episodes
+        self._done = 0
+        self.action_space = spaces.Discrete(ACTIONS)
+        self.observation_space = spaces.Discrete(ACTIONS if self._states else len(TRIPLES))
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.int64, dict[str, Any]]:
+        """A new session; its seed is drawn from the environment's generator."""
+        super().reset(seed=seed)
+        seeds = self.np_random.integers(2**53, size=1)
+        self._partners = Partners(self._user, self._study, drawn(seeds, self._episodes + 1))
+        self._done = 0
+        return self._seen()
+
+    def step(self, action: np.int64) -> tuple[np.int64, float, bool, bool, dict[str, Any]]:
+        """Explain with this action; what comes next."""
+        reward = self._partners.perform(self._done, np.array([int(action)]))
+        self._done += 1
+        observation, info = self._seen()
+        return observation, float(reward[0]), False, self._done >= self._episodes, info
+
+    def _seen(self) -> tuple[np.int64, dict[str, Any]]:
+        triple = int(self._partners.triple(self._done)[0])
+        suggested = self._suggested[triple]
+        info = {"triple": TRIPLES[triple].name, "suggested": suggested}
+        return np.int64(suggested if self._states else triple), info
+
+
+def _user(user: str | User) -> User:
+    if isinstance(user, User):
+        return user
+    return paper_user(user) if user in PAPER_USERS else parse_user(Path(user).read_text(encoding="utf-8"), user)
+
+
+def register() -> None:
+    """Make the environment known to Gymnasium; a second time changes nothing."""
+    if ENV_ID not in gymnasium.registry:
+        gymnasium.register(id=ENV_ID, entry_point="shift_simulator.env:PartnerEnv")
+
+
+register()

@@ -1,0 +1,46 @@
+"""The Gymnasium environment keeps Gymnasium's contract and meets the partners of the simulation."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+gymnasium = pytest.importorskip("gymnasium", reason="an optional extra")
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+from shift_schemas.study import Study  # noqa: E402
+from shift_simulator.env import ENV_ID  # noqa: E402
+from shift_simulator.optimum import optimum  # noqa: E402
+from shift_simulator.users import paper_user  # noqa: E402
+
+
+@pytest.mark.parametrize("user", ["A", "B", "C", "D"])
+@pytest.mark.parametrize("observation", ["states", "triples"])
+def test_it_passes_gymnasiums_own_checker(user: str, observation: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        check_env(gymnasium.make(ENV_ID, user=user, observation=observation).unwrapped)
+
+
+def test_following_the_suggestion_is_nearly_optimal_with_user_a() -> None:
+    env = gymnasium.make(ENV_ID, user="A", observation="states")
+    totals = []
+    for seed in range(30):
+        state, _ = env.reset(seed=seed)
+        total, over = 0.0, False
+        while not over:
+            state, reward, _, over, _ = env.step(state)
+            total += reward
+        totals.append(total)
+    assert np.mean(totals) == pytest.approx(optimum(paper_user("A"), Study(study="s"), 100), abs=1.5)
+
+
+def test_one_seed_is_one_session() -> None:
+    def session() -> list[tuple[int, float]]:
+        env = gymnasium.make(ENV_ID, user="B")
+        env.reset(seed=3)
+        return [(int(o), r) for o, r, *_ in (env.step(n % 6) for n in range(100))]
+
+    assert session() == session()
