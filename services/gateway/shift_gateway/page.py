@@ -22,9 +22,9 @@ PAGE = """<!doctype html>
 <tr><th>session</th><th>participant</th><th>study</th><th>state</th><th>decisions</th></tr></thead>
 <tbody id="sessions"></tbody></table>
 <h2>How to start</h2>
-<pre>curl -X POST ORIGIN/v1/sessions -H 'Content-Type: application/json' \\
+<pre>curl -X POST ORIGIN/v1/sessions \\
      -d '{"participant": "P01", "session": "s1"}'
-curl -X POST ORIGIN/v1/sessions/s1/decisions -H 'Content-Type: application/json' \\
+curl -X POST ORIGIN/v1/sessions/s1/decisions \\
      -d '{"task": "grasp"}'</pre>
 <p><a href="/docs">All paths</a> · <a href="/openapi.json">OpenAPI</a> · <a href="/readyz">readiness</a> ·
 <a href="/metrics">metrics</a> · <a href="/v1/recordings">recordings</a></p>
