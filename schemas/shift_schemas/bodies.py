@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, RootModel
 
 from shift_schemas.ids import Id
-from shift_schemas.messages import Message, Result, Strategy, Text
+from shift_schemas.messages import JsonObject, Message, Result, Strategy, Text
 
 
 class StartBody(Message):
@@ -15,9 +15,13 @@ class StartBody(Message):
 
     participant: Id = Field(description="Pseudonym of the participant.")
     session: Id | None = Field(default=None, description="Left out: a new id.")
-    study: Id | dict[str, Any] = Field(default="default", description="A study's name, or the study itself.")
+    study: Id | JsonObject = Field(default="default", description="A study's name, or the study itself.")
     seed: Annotated[int, Field(ge=0, lt=2**53)] | None = Field(default=None, description="Left out: from the id.")
     condition: Id | None = Field(default=None, description="Left out: the study's own values.")
+
+
+class PatchBody(RootModel[JsonObject]):
+    """Change the study in force: a JSON merge patch (RFC 7386) of it."""
 
 
 class DecisionBody(Message):

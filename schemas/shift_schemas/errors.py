@@ -6,6 +6,7 @@ so a service's refusal arrives at the door as the error that it was.
 
 from __future__ import annotations
 
+import re
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -134,11 +135,16 @@ def shorten(value: Any) -> str:
     return text if len(text) <= VALUE_LENGTH else text[: VALUE_LENGTH - 1] + "…"
 
 
+_BRANCH = re.compile(r"constrained-str|[a-z-]+\[.*\]", re.DOTALL)
+"""What pydantic calls the branch of a union or the key of a map: no field of the peer's."""
+
+
 def field_errors(error: ValidationError, prefix: str = "") -> tuple[FieldError, ...]:
     """Pydantic's complaints as field errors, at most twenty of them."""
     found = []
     for e in error.errors(include_url=False, include_context=False)[:20]:
-        field = ".".join([*([prefix] if prefix else []), *map(str, e["loc"])]) or "body"
+        names = [str(part) for part in e["loc"] if not _BRANCH.fullmatch(str(part))]
+        field = ".".join([*([prefix] if prefix else []), *names]) or "body"
         missing = e["type"] == "missing"
         found.append(FieldError(field=shorten(field), value="" if missing else shorten(e["input"]), rule=e["msg"]))
     return tuple(found)

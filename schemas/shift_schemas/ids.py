@@ -14,8 +14,8 @@ ID_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,62}$"
 ID_RULE = "1 to 63 letters, digits, - and _, beginning with a letter or digit"
 _ID = re.compile(ID_PATTERN[1:-1])
 
-Id = Annotated[str, StringConstraints(pattern=r"\A[A-Za-z0-9][A-Za-z0-9_-]{0,62}\z")]
-"""A participant, session, task, AOI, source or ``..._id``."""
+Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
+"""A participant, session, task, AOI, source or ``..._id``. Pydantic's ``$`` is the very end, before no newline."""
 
 
 def is_id(text: object) -> bool:

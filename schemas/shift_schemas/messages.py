@@ -6,9 +6,10 @@ and the recording's topic. A ``None`` is left out of a recording, whose schemas 
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from shift_schemas.ids import Id
 from shift_schemas.stamps import Stamp
@@ -20,6 +21,27 @@ SessionState = Literal["live", "ending", "ended"]
 GazeOutcome = Literal["applied", "late"]
 Seconds = Annotated[float, Field(ge=-1e11, le=1e11)]
 Text = Annotated[str, Field(max_length=10_000)]
+DEEPEST = 32
+"""Nesting of a plain JSON object within a message; a study has 6."""
+
+
+def _plain(value: dict[str, Any]) -> dict[str, Any]:
+    """Refuse what JSON cannot say back: infinite numbers (``1e999`` is one), half characters, bottomless nesting."""
+    level: list[Any] = [value]
+    for _ in range(DEEPEST):
+        if any(isinstance(v, float) and not isfinite(v) for v in level):
+            raise ValueError("a number must be finite")
+        if any(isinstance(v, str) and not v.isascii() and any("\ud800" <= c <= "\udfff" for c in v) for v in level):
+            raise ValueError("half of a character (a lone surrogate) is no text")
+        inner = [v for v in level if isinstance(v, (dict, list))]
+        level = [w for v in inner for w in ((*v, *v.values()) if isinstance(v, dict) else v)]
+        if not level:
+            return value
+    raise ValueError(f"it is nested deeper than {DEEPEST} levels")
+
+
+JsonObject = Annotated[dict[str, Any], AfterValidator(_plain)]
+"""A JSON object as it came, of which only is known that it can be said back."""
 
 
 class Message(BaseModel):
@@ -365,7 +387,7 @@ class StartSession(Command):
     procedure = "start_session"
 
     participant: Id
-    study: str | dict[str, Any] = Field(default="default", description="A study's id, or the study itself.")
+    study: str | JsonObject = Field(default="default", description="A study's id, or the study itself.")
     seed: Annotated[int, Field(ge=0, lt=2**53)] | None = None
     condition: Id | None = None
     replay_of: str = ""
@@ -384,7 +406,7 @@ class Configure(Command):
 
     procedure = "configure"
 
-    patch: dict[str, Any]
+    patch: JsonObject
 
 
 class Mark(Command):
@@ -411,6 +433,11 @@ class SetOverride(Command):
     task: Id
     strategy: Strategy
     reason: Text = ""
+
+    def content(self) -> str:
+        """The same levels in another order are the same content."""
+        levels = dict(sorted(self.strategy.items()))
+        return Command.content(self.model_copy(update={"strategy": levels}))
 
 
 class ReportPerformance(Command):

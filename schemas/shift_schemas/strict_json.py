@@ -1,8 +1,9 @@
-"""JSON without the liberties that Python takes: no NaN, no key twice, no bottomless nesting. Pure."""
+"""JSON without the liberties that Python takes: nothing infinite, no key twice, no bottomless nesting. Pure."""
 
 from __future__ import annotations
 
 import json
+from math import isfinite
 from typing import Any
 
 from shift_schemas.errors import FieldError, MalformedMessage
@@ -11,7 +12,7 @@ from shift_schemas.errors import FieldError, MalformedMessage
 def parse_json(raw: bytes | str) -> Any:
     """What ``raw`` says. Raises :class:`MalformedMessage` with the rule that it breaks."""
     try:
-        return json.loads(raw, object_pairs_hook=_once, parse_constant=_no_constant)
+        return json.loads(raw, object_pairs_hook=_once, parse_constant=_no_constant, parse_float=_finite)
     except (ValueError, RecursionError) as e:
         rule = str(e) if isinstance(e, _Refused) else "the body must be JSON"
         error = FieldError(field="body", value="", rule=rule)
@@ -27,6 +28,13 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) != len(pairs):
         raise _Refused("a key is given twice")
     return found
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not isfinite(number):
+        raise _Refused("a number must be finite")
+    return number
 
 
 def _no_constant(name: str) -> Any:

@@ -46,7 +46,9 @@ class Aoi(_Part):
         if (self.rectangle is None) == (self.polygon is None):
             raise ValueError("give either rectangle: [left, top, right, bottom] or polygon: [[x, y], ...]")
         if self.rectangle and not (self.rectangle[0] < self.rectangle[2] and self.rectangle[1] < self.rectangle[3]):
-            raise ValueError("rectangle is left, top, right, bottom: left < right and top < bottom")
+            raise ValueError(
+                f"rectangle is left, top, right, bottom: left < right and top < bottom; it is {self.rectangle}"
+            )
         return self
 
 
@@ -69,7 +71,7 @@ class CapacitySettings(_Part):
     @model_validator(mode="after")
     def _ordered(self) -> CapacitySettings:
         if not self.min <= self.start <= self.max:
-            raise ValueError("min <= start <= max must hold")
+            raise ValueError(f"min <= start <= max must hold; it is {self.min} <= {self.start} <= {self.max}")
         return self
 
 
@@ -128,11 +130,13 @@ class StrategySettings(_Part):
     @model_validator(mode="after")
     def _ranked(self) -> StrategySettings:
         if len(self.thresholds) != len(self.levels) - 1:
-            raise ValueError(f"{len(self.levels)} levels need {len(self.levels) - 1} thresholds")
+            raise ValueError(
+                f"{len(self.levels)} levels need {len(self.levels) - 1} thresholds; they are {self.thresholds}"
+            )
         if any(a >= b for a, b in zip(self.thresholds, self.thresholds[1:], strict=False)):
-            raise ValueError("thresholds must rise")
+            raise ValueError(f"thresholds must rise; they are {self.thresholds}")
         if len(set(self.levels)) != len(self.levels):
-            raise ValueError("levels must differ")
+            raise ValueError(f"levels must differ; they are {', '.join(self.levels)}")
         return self
 
 
@@ -215,8 +219,10 @@ class ScoringSettings(_Part):
     The actions follow the strategies as listed where the default ones are all named, else as here.
     """
 
-    strategies: dict[Level, StrategySettings] = Field(min_length=1, max_length=6)
-    table: ScoringTable
+    strategies: dict[Level, StrategySettings] = Field(
+        min_length=1, max_length=6, description="The scaffolding strategies, in the order of the actions' levels."
+    )
+    table: ScoringTable = Field(description="The paper's Table I; chosen otherwise for what a study adds.")
     s_max: Positive = Field(default=3.0, description="S_max: the sum that is a score of 1; three observations.")
 
     @model_validator(mode="before")
@@ -244,7 +250,7 @@ class ScoringSettings(_Part):
                 row: Row = getattr(part, category)
                 if set(row) != names:
                     raise ValueError(
-                        f"the table's row {category} needs an entry of 0 or 1 for each of {', '.join(self.strategies)}; "
+                        f"row {category} of the table needs a 0 or 1 for each of {', '.join(self.strategies)}; "
                         f"it has {', '.join(row) or 'none'}"
                     )
         actions = 1
@@ -301,7 +307,7 @@ class LearnerSettings(_Part):
         default=0.5, description="Standard deviation of a reward around linear-thompson's line; chosen."
     )
     planning_horizon: int = Field(
-        default=6, ge=0, le=50, description="How many interactions planner looks ahead; chosen, 4 to 30 do the same."
+        default=4, ge=0, le=50, description="How many interactions planner looks ahead; chosen, 4 to 30 do the same."
     )
     planning_discount: Probability = Field(
         default=0.9, description="What planner's next interaction is worth of the present one; chosen."
@@ -365,13 +371,18 @@ class Study(_Part):
                 f"capacity.demanding names {', '.join(unknown)}; the strategies' levels are {', '.join(sorted(levels))}"
             )
         if self.attention.weight_min * len(self.aois) > 1 + 1e-9:
-            raise ValueError(f"attention.weight_min times {len(self.aois)} AOIs must not exceed 1")
+            raise ValueError(
+                f"attention.weight_min is {self.attention.weight_min}; times {len(self.aois)} AOIs it must not exceed 1"
+            )
         if self.attention.distracted_dominance > self.attention.focused_dominance:
-            raise ValueError("attention.distracted_dominance must not exceed attention.focused_dominance")
+            raise ValueError(
+                f"attention.distracted_dominance is {self.attention.distracted_dominance}; it must not exceed "
+                f"attention.focused_dominance, which is {self.attention.focused_dominance}"
+            )
         for name, overrides in self.conditions.items():
             if fixed := sorted(set(overrides) - CONDITIONAL):
                 raise ValueError(
-                    f"condition {name} overrides {', '.join(fixed)}; it can override {', '.join(sorted(CONDITIONAL))}"
+                    f"conditions.{name} overrides {', '.join(fixed)}; it can override {', '.join(sorted(CONDITIONAL))}"
                 )
         return self
 

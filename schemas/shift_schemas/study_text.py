@@ -9,16 +9,21 @@ import difflib
 import json
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Any
+from itertools import islice
+from typing import Any, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.study import DEFAULT_STRATEGIES, Study, merge_patch
+from shift_schemas.study import DEFAULT_STRATEGIES, DEFAULT_TABLE, Study, merge_patch
 
 Path = tuple[str | int, ...]
 Lines = dict[Path, int]
+LARGEST = 50_000
+"""Entries of a study file, aliases counted each time: a few lines of YAML can spell billions of them."""
+RULE_LENGTH = 400
+"""How much of a rule is said: rules name what is there, and that can be as long as what was sent."""
 
 
 def parse_study(text: str, name: str = "study") -> Study:
@@ -34,17 +39,32 @@ def parse_study(text: str, name: str = "study") -> Study:
     except (yaml.YAMLError, RecursionError) as e:
         mark = getattr(e, "problem_mark", None)
         where = f"{name}:{mark.line + 1}" if mark else name
-        raise InvalidStudy(
-            f"{where}: this is not YAML: {getattr(e, 'problem', None) or 'it is nested too deep'}"
-        ) from e
+        raise InvalidStudy(f"{where}: this is not YAML: {_problem_of(e) or 'it is nested too deep'}") from e
     if not isinstance(node, yaml.MappingNode):
         raise InvalidStudy(f"{name}:1: a study is a mapping; begin with 'study: my-study'")
     lines: Lines = {}
-    for path, line, twice in _walk(node, (), 0):
+    for path, line, twice in islice(_walk(node, (), 0), LARGEST + 1):
         if twice:
             raise InvalidStudy(f"{name}:{line}: {_dotted(path)} is given twice; keep one of the two")
         lines[path] = line
-    return study_of(yaml.safe_load(text), name, lines)
+    if len(lines) > LARGEST:
+        raise InvalidStudy(
+            f"{name}: it has more than {LARGEST} entries, aliases counted each time; write a smaller one"
+        )
+    return study_of(_constructed(text, name), name, lines)
+
+
+def _constructed(text: str, name: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as e:  # ValueError: the 99th of a month
+        mark = getattr(e, "problem_mark", None)
+        where = f"{name}:{mark.line + 1}" if mark else name
+        raise InvalidStudy(f"{where}: {_problem_of(e) or e}; write plain text and numbers") from e
+
+
+def _problem_of(error: Exception) -> str:
+    return getattr(error, "problem", None) or getattr(error, "reason", None) or ""
 
 
 def study_of(data: Any, name: str = "study", lines: Lines | None = None) -> Study:
@@ -73,7 +93,7 @@ def study_in_force(study: Study, condition: str | None) -> Study:
 
 def patched(study: Study, patch: Any) -> Study:
     """The study after a JSON merge patch (RFC 7386), whether or not it may change now."""
-    return _validated(merge_patch(study_data(study), patch), "config", {}, ())
+    return _validated(_merged(study, patch), "config", {}, ())
 
 
 def study_data(study: Study) -> dict[str, Any]:
@@ -96,8 +116,26 @@ def study_from_json(text: str) -> Study:
 
 
 def _in_force(study: Study, condition: str, name: str, lines: Lines) -> Study:
-    merged = merge_patch(study_data(study), study.conditions[condition])
-    return _validated(merged, name, lines, ("conditions", condition))
+    return _validated(_merged(study, study.conditions[condition]), name, lines, ("conditions", condition))
+
+
+def _merged(study: Study, patch: Any) -> Any:
+    """The study's data under a merge patch. A strategy set to null is taken out, with its column of the table."""
+    merged = merge_patch(study_data(study), patch)
+    for name in _taken_out(patch):
+        scoring = merged["scoring"]
+        if name in DEFAULT_STRATEGIES:
+            scoring["strategies"][name] = None  # left out, it would be the default's
+        if isinstance(scoring.get("table"), dict):
+            column = {part: {row: {name: None} for row in rows} for part, rows in DEFAULT_TABLE.items()}
+            scoring["table"] = merge_patch(scoring["table"], column)
+    return merged
+
+
+def _taken_out(patch: Any) -> list[str]:
+    for key in ("scoring", "strategies"):
+        patch = patch.get(key) if isinstance(patch, dict) else None
+    return [name for name, given in patch.items() if given is None] if isinstance(patch, dict) else []
 
 
 def _validated(data: Any, name: str, lines: Lines, under: Path) -> Study:
@@ -114,7 +152,7 @@ def _validated(data: Any, name: str, lines: Lines, under: Path) -> Study:
 
 
 def _mistake(found: Any, lines: Lines, under: Path) -> tuple[int | None, FieldError]:
-    path: Path = tuple(p for p in found["loc"] if p != "[key]")
+    path: Path = tuple(p for p in found["loc"] if p != "[key]") or _named_first(found["msg"], lines)
     line = next(
         (
             lines[p]
@@ -125,7 +163,15 @@ def _mistake(found: Any, lines: Lines, under: Path) -> tuple[int | None, FieldEr
         lines.get((), None),
     )
     value = "" if found["type"] == "missing" else shorten(found["input"])
-    return line, FieldError(field=_dotted(path) or "study", value=value, rule=_rule(found, path, value))
+    rule = _rule(found, path, value)
+    rule = rule if len(rule) <= RULE_LENGTH else rule[: RULE_LENGTH - 1] + "…"
+    return line, FieldError(field=shorten(_dotted(path)) or "study", value=value, rule=rule)
+
+
+def _named_first(message: str, lines: Lines) -> Path:
+    """A mistake in how parts fit together is the whole study's; its message begins with the part to change."""
+    path = tuple(message.removeprefix("Value error, ").split(" ", 1)[0].split("."))
+    return path if path in lines else ()
 
 
 def _rule(found: Any, path: Path, value: str) -> str:
@@ -134,11 +180,11 @@ def _rule(found: Any, path: Path, value: str) -> str:
         known = sorted(_fields_at(path[:-1]))
         near = difflib.get_close_matches(str(path[-1]), known, n=1)
         meant = f"write {near[0]!r}" if near else f"write one of {', '.join(known)}"
-        return f"{str(path[-1])!r} is no key here; {meant}"
+        return f"{shorten(str(path[-1]))!r} is no key here; {meant}"
     if found["type"] == "missing":
         return "it is missing; write it"
     if found["type"] == "value_error":
-        return message
+        return message if isinstance(found["input"], dict) else f"{value} does not do: {message}"
     default = _default_at(path)
     instead = "" if default is None else f"; write for example the default, {json.dumps(default)}"
     return f"{value!r} does not do: {message[0].lower()}{message[1:]}{instead}"
@@ -147,16 +193,19 @@ def _rule(found: Any, path: Path, value: str) -> str:
 def _fields_at(path: Path) -> Iterator[str]:
     here: Any = Study
     for part in path:
-        field = here.model_fields.get(str(part)) if isinstance(here, type) and issubclass(here, BaseModel) else None
-        here = _model_in(field.annotation) if field else None
+        here = _inside(here, part)
     if isinstance(here, type) and issubclass(here, BaseModel):
         yield from here.model_fields
 
 
-def _model_in(annotation: Any) -> Any:
+def _inside(annotation: Any, part: str | int) -> Any:
+    """The annotation of what stands at ``part`` of a model, list or mapping."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((m for a in getattr(annotation, "__args__", ()) if (m := _model_in(a))), None)
+        field = annotation.model_fields.get(str(part))
+        return field.annotation if field else None
+    if get_origin(annotation) in (dict, list):
+        return get_args(annotation)[-1]
+    return next((found for a in get_args(annotation) if (found := _inside(a, part))), None)
 
 
 _DEFAULTS: dict[str, Any] = {}
@@ -179,9 +228,10 @@ def _walk(node: yaml.Node, path: Path, depth: int) -> Iterator[tuple[Path, int, 
     if isinstance(node, yaml.MappingNode):
         seen = set()
         for key, value in node.value:
-            yield (*path, key.value), key.start_mark.line + 1, key.value in seen
-            seen.add(key.value)
-            yield from ((p, n, t) for p, n, t in _walk(value, (*path, key.value), depth + 1) if p != (*path, key.value))
+            name = str(key.value)  # a key can be a list
+            yield (*path, name), key.start_mark.line + 1, name in seen
+            seen.add(name)
+            yield from ((p, n, t) for p, n, t in _walk(value, (*path, name), depth + 1) if p != (*path, name))
     elif isinstance(node, yaml.SequenceNode):
         for i, value in enumerate(node.value):
             yield from _walk(value, (*path, i), depth + 1)

@@ -1,0 +1,101 @@
+"""Keys: building and parsing are inverses, and nothing else parses."""
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from shift_schemas.errors import MalformedMessage
+from shift_schemas.keys import (
+    DOORS,
+    OWNER_OF,
+    OWNERS,
+    PROCEDURE_OWNER,
+    READS,
+    SERVICES,
+    STREAMS,
+    SUBJECTS,
+    CommandKey,
+    FactKey,
+    Key,
+    ServiceKey,
+    StreamKey,
+    build_key,
+    parse_key,
+)
+from shift_schemas.messages import COMMANDS, FACTS
+from strategies import HOSTILE_IDS, ids
+
+keys = (
+    st.builds(FactKey, ids, st.sampled_from(SUBJECTS))
+    | st.builds(StreamKey, ids, st.sampled_from(sorted(STREAMS)))
+    | st.builds(CommandKey, ids, st.sampled_from(sorted(PROCEDURE_OWNER)))
+    | st.builds(ServiceKey, st.sampled_from(SERVICES), st.sampled_from(DOORS))
+)
+parts = ids | st.sampled_from(
+    ["shift", "v1", "v2", "@service", "in", "rpc", "gaze", "decide", "decider", "outbox", "*", "**", "", "decision"]
+)
+
+
+@given(keys)
+@example(FactKey("in", "gaze"))
+@example(StreamKey("rpc", "gaze"))
+@example(CommandKey("in", "decide"))
+@example(FactKey("rpc", "decision"))
+def test_parsing_is_the_inverse_of_building(key: Key) -> None:
+    assert parse_key(build_key(key)) == key
+
+
+@given(
+    st.lists(parts, max_size=7).map("/".join) | st.lists(parts, max_size=4).map(lambda p: "/".join(["shift/v1", *p]))
+)
+def test_what_parses_is_a_key_that_is_built_to_the_same_text(text: str) -> None:
+    try:
+        key = parse_key(text)
+    except MalformedMessage:
+        return
+    assert build_key(key) == text
+
+
+@given(st.text(max_size=60))
+def test_any_other_text_is_no_key(text: str) -> None:
+    with pytest.raises(MalformedMessage):
+        parse_key(text)
+
+
+@pytest.mark.parametrize("session", HOSTILE_IDS, ids=lambda t: ascii(t)[:20])
+def test_hostile_sessions_are_neither_built_nor_parsed(session: str) -> None:
+    for key in (FactKey(session, "gaze"), StreamKey(session, "gaze"), CommandKey(session, "decide")):
+        with pytest.raises(MalformedMessage):
+            build_key(key)
+    for text in (f"shift/v1/{session}/gaze", f"shift/v1/{session}/in/gaze", f"shift/v1/{session}/rpc/decide"):
+        with pytest.raises(MalformedMessage) as refused:
+            parse_key(text)
+        assert len(refused.value.detail) < 400, "a long key is not said back"
+
+
+@pytest.mark.parametrize(
+    "key",
+    [FactKey("s1", "gaze/x"), FactKey("s1", "*"), StreamKey("s1", "decision"), CommandKey("s1", "gaze"),
+     ServiceKey("stranger", "health"), ServiceKey("decider", "**")],
+)  # fmt: skip
+def test_unknown_words_make_no_key(key: Key) -> None:
+    with pytest.raises(MalformedMessage):
+        build_key(key)
+
+
+def test_each_fact_and_each_command_has_exactly_one_owner() -> None:
+    assert sorted(OWNER_OF) == sorted(SUBJECTS) == sorted(FACTS)
+    assert sum(map(len, OWNERS.values())) == len(SUBJECTS)
+    assert set(PROCEDURE_OWNER) == set(COMMANDS)
+
+
+def test_topics_are_in_the_contract_s_order() -> None:
+    assert SUBJECTS == tuple(FACTS) == (
+        "session", "config", "gaze", "fixation", "observation", "estimate", "decision", "override", "performance",
+        "transition", "policy", "marker",
+    )  # fmt: skip
+
+
+def test_whoever_steps_on_a_subject_reads_its_owner() -> None:
+    for reads in READS.values():
+        for owner, subjects in reads.items():
+            assert subjects <= set(OWNERS[owner])
