@@ -4,14 +4,14 @@ Pure; arrays have a leading axis of runs, live it is 1. Three experts predict wh
 
 1. *wrong entries*: for each strategy a posterior over its 2**10 columns. An action succeeds when every strategy's
    level suits; the strategies' posteriors are held as independent and each is updated with the others' expectation
-   (assumed density filtering, Minka 2001; with a success the product is exact).
+   (assumed density filtering, Minka 2001).
 2. *a preference*: the exact posterior over the list of preferences.
-3. *nothing known*: a Beta posterior for each triple and action by itself, that slowly forgets.
+3. *nothing known*: plain counts of what each action did at each triple, a Beta posterior that slowly forgets.
 
 They are averaged by how well each has predicted (Bayesian model averaging, Hoeting et al. 1999), so that the last
-takes over where both ideas of the person are wrong. People change: after every result each posterior gives a small
-share back to its prior (fixed share, Herbster & Warmuth 1998), which is exact for somebody who is replaced by
-another with that probability.
+takes over where both ideas of the person are wrong.
+People change: after every result each posterior gives a small share back to its prior (fixed share, Herbster &
+Warmuth 1998), which is exact for somebody who is replaced by another with that probability.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from shift_learner.learners.planning.plausible import Bools, Floats, Ints, Plaus
 LOW, HIGH = 0.025, 0.975
 """Chance of success where an expert of the first two says no, or yes; chosen: one in forty is chance."""
 EXPERTS = (0.5, 0.4, 0.1)
-"""Prior of the three experts; chosen on people generated around other tables (docs/learners.md)."""
-CELL_SUCCESS, CELL_FAILURE = 0.3, 0.7
-"""Beta prior of the third expert; chosen: an action that nothing is known of mostly fails, one trial decides."""
-CELL_MEMORY = 0.98
-"""What the third expert keeps of its counts at each result; chosen: half is gone after 34."""
+"""Prior of the three; chosen on people generated around other tables (docs/learners.md)."""
+COUNT_SUCCESS, COUNT_FAILURE = 0.3, 0.7
+"""Beta prior of counts; chosen: an action that nothing is known of mostly fails, and one trial decides."""
+COUNT_MEMORY = 0.98
+"""What is kept of the counts at each result; chosen: half is gone after 34."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +67,12 @@ def priors(plausible: Plausible, settings: LearnerSettings) -> Priors:
 
 def started(prior: Priors, runs: int) -> Beliefs:
     """Before the first result."""
-    cells = np.zeros((runs, prior.plausible.preferences.success.shape[1]))
+    counts = np.zeros((runs, prior.plausible.preferences.success.shape[1]))
     return Beliefs(
         tuple(np.repeat(column[None], runs, axis=0) for column in prior.columns),
         np.repeat(prior.plausible.preferences.prior[None], runs, axis=0),
-        cells,
-        cells,
+        counts,
+        counts,
         np.repeat(prior.experts[None], runs, axis=0),
     )
 
@@ -85,9 +85,9 @@ def chances(beliefs: Beliefs, prior: Priors) -> Floats:
         by_level = (weights @ column.suits).reshape(len(weights), -1, column.levels)
         suits = suits * by_level[:, :, people.levels[:, s]]
     preferred = (beliefs.preferences @ people.preferences.success).reshape(np.shape(suits))
-    cells = _cell_chances(beliefs.successes, beliefs.failures).reshape(np.shape(suits))
+    counted = _counted_chances(beliefs.successes, beliefs.failures).reshape(np.shape(suits))
     first, second, third = (beliefs.experts[:, i, None, None] for i in range(3))
-    mixed: Floats = first * _noisy(suits) + second * _noisy(preferred) + third * cells
+    mixed: Floats = first * _noisy(suits) + second * _noisy(preferred) + third * counted
     return mixed
 
 
@@ -95,14 +95,14 @@ def told(beliefs: Beliefs, prior: Priors, triple: Ints, action: Ints, success: B
     """After a result in each run: [runs] each."""
     people = prior.plausible
     runs, cell = np.arange(len(triple)), triple * len(people.levels) + action
-    suited = [c.suits.T[triple * c.levels + people.levels[action, s]] for s, c in enumerate(people.columns)]
+    suited = [c.suits_by_level[triple * c.levels + people.levels[action, s]] for s, c in enumerate(people.columns)]
     fit = [_dot(w, s) for w, s in zip(beliefs.columns, suited, strict=True)]
-    right = people.preferences.success.T[cell]
+    right = people.preferences.success_by_cell[cell]
     predicted = np.stack(
         [
             _noisy(np.prod(fit, axis=0)),
             _noisy(_dot(beliefs.preferences, right)),
-            _cell_chances(beliefs.successes[runs, cell], beliefs.failures[runs, cell]),
+            _counted_chances(beliefs.successes[runs, cell], beliefs.failures[runs, cell]),
         ],
         axis=1,
     )
@@ -113,8 +113,8 @@ def told(beliefs: Beliefs, prior: Priors, triple: Ints, action: Ints, success: B
             for i, (w, s) in enumerate(zip(beliefs.columns, suited, strict=True))
         ),
         _shared(beliefs.preferences * _likelihood(right, success), people.preferences.prior, prior.change),
-        _counted(beliefs.successes, runs, cell, success),
-        _counted(beliefs.failures, runs, cell, ~success),
+        _counted(beliefs.successes, (runs, cell), success),
+        _counted(beliefs.failures, (runs, cell), ~success),
         _shared(experts, prior.experts, prior.change),
     )
 
@@ -128,9 +128,17 @@ def _noisy(right: Floats | float) -> Floats:
 
 
 def _likelihood(right: Floats, success: Bools) -> Floats:
-    """Of the result, for each hypothesis: [runs, hypotheses]."""
-    chance = _noisy(right)
-    return np.where(success[:, None], chance, 1 - chance)
+    """Of the result, for each hypothesis: :func:`_noisy`, or 1 less it after a failure, [runs, hypotheses]."""
+    wrong, step = _line(success)
+    likelihood: Floats = right * step
+    likelihood += wrong
+    return likelihood
+
+
+def _line(success: Bools) -> tuple[Floats, Floats]:
+    """The likelihood of the result where an action is wrong, and what being right adds, [runs, 1] each."""
+    sign = np.where(success, 1.0, -1.0)[:, None]
+    return np.where(success, LOW, 1 - LOW)[:, None], sign * (HIGH - LOW)
 
 
 def _column_likelihood(suited: Floats, fit: list[Floats], own: int, success: Bools) -> Floats:
@@ -139,25 +147,29 @@ def _column_likelihood(suited: Floats, fit: list[Floats], own: int, success: Boo
     for s, probability in enumerate(fit):
         if s != own:
             others = others * probability
-    return _likelihood(suited * others[:, None], success)
+    wrong, step = _line(success)
+    likelihood: Floats = suited * (others[:, None] * step)
+    likelihood += wrong
+    return likelihood
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    total: Floats = (a * b).sum(axis=1)
+    total: Floats = np.einsum("rk,rk->r", a, b)
     return total
 
 
 def _shared(weights: Floats, prior: Floats, change: float) -> Floats:
-    """Normalised, and a share given back to the prior."""
-    shared: Floats = weights * ((1 - change) / weights.sum(axis=1, keepdims=True)) + change * prior
-    return shared
+    """Normalised, and a share given back to the prior; in place."""
+    weights *= (1 - change) / weights.sum(axis=1, keepdims=True)
+    weights += change * prior
+    return weights
 
 
-def _cell_chances(successes: Floats, failures: Floats) -> Floats:
-    return (successes + CELL_SUCCESS) / (successes + failures + (CELL_SUCCESS + CELL_FAILURE))
+def _counted_chances(successes: Floats, failures: Floats) -> Floats:
+    return (successes + COUNT_SUCCESS) / (successes + failures + (COUNT_SUCCESS + COUNT_FAILURE))
 
 
-def _counted(counts: Floats, runs: Ints, cell: Ints, more: Bools) -> Floats:
-    after = counts * CELL_MEMORY
-    after[runs, cell] += more
+def _counted(counts: Floats, places: tuple[Ints, Ints], more: Bools) -> Floats:
+    after = counts * COUNT_MEMORY
+    after[places] += more
     return after

@@ -122,11 +122,12 @@ def _chosen(battery: Battery, p: Floats, gain: Floats, value: Floats, discount: 
 def _best(chosen: tuple[Floats, Floats]) -> Floats:
     """The best value after each previous action: to repeat it, or any other."""
     repeated, other = chosen
-    below = np.maximum.accumulate(other, axis=0)
-    above = np.maximum.accumulate(other[::-1], axis=0)[::-1]
-    best = repeated.copy()
-    np.maximum(best[1:], below[:-1], out=best[1:])
-    np.maximum(best[:-1], above[1:], out=best[:-1])
+    best, last = repeated.copy(), len(repeated) - 1
+    below, above = other[0], other[last]
+    for action in range(1, last + 1):
+        np.maximum(best[action], below, out=best[action])
+        np.maximum(best[last - action], above, out=best[last - action])
+        below, above = np.maximum(below, other[action]), np.maximum(above, other[last - action])
     return best
 
 

@@ -38,6 +38,8 @@ class Columns(NamedTuple):
 
     suits: Floats
     """[columns, 30 x levels]: 1 where the level is the one that the column suggests for the triple."""
+    suits_by_level: Floats
+    """The same turned, so that what one result says of all columns lies side by side."""
     flips: Ints
     """[columns]: how many entries differ from the study's table."""
     levels: int
@@ -48,6 +50,8 @@ class Preferences(NamedTuple):
 
     success: Floats
     """[preferences, 30 x actions]: 1 where the action succeeds."""
+    success_by_cell: Floats
+    """The same turned."""
     prior: Floats
     """[preferences], sums to 1."""
 
@@ -78,8 +82,8 @@ def _columns(scoring: ScoringSettings, name: str, strategy: StrategySettings) ->
     rows = np.array([[CATEGORIES.index(c) for c in zip(parts, t, strict=True)] for t in TRIPLES])
     scores = strategy.weight * entries[:, rows].sum(axis=2) / scoring.s_max
     ranks = (scores[:, :, None] >= np.array(strategy.thresholds) - MARGIN).sum(axis=2)
-    suits = ranks[:, :, None] == np.arange(len(strategy.levels))
-    return Columns(suits.reshape(len(flipped), -1).astype(np.float64), flipped.sum(axis=1), len(strategy.levels))
+    suits = (ranks[:, :, None] == np.arange(len(strategy.levels))).reshape(len(flipped), -1).astype(np.float64)
+    return Columns(suits, np.ascontiguousarray(suits.T), flipped.sum(axis=1), len(strategy.levels))
 
 
 def _column(scoring: ScoringSettings, name: str) -> Floats:
@@ -102,7 +106,8 @@ def _preferences(scoring: ScoringSettings, levels: Ints, suggested: tuple[int, .
     for table, group in zip(tables, groups, strict=True):
         table[:, :, group] = holds[:, :, None]
     prior = np.tile([c.prior for c in conditions], len(groups))
-    return Preferences(tables.reshape(len(prior), -1), prior / prior.sum())
+    success = tables.reshape(len(prior), -1)
+    return Preferences(success, np.ascontiguousarray(success.T), prior / prior.sum())
 
 
 def _groups(levels: Ints) -> list[Ints]:

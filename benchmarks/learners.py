@@ -1,0 +1,67 @@
+"""What a decision of the planner costs: live (one session, the whole policy) and in simulation (runs at once).
+
+    python benchmarks/learners.py [--runs 1000]
+
+Live, a decision is a decided and a rewarded with the 30 rows published after each. Exit code 1 where the median is
+2 ms or more live, or 0.2 ms or more in simulation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+import time
+
+from shift_learner.learner import Context, Taken
+from shift_learner.learners import learner_named
+from shift_schemas.study import Study
+from shift_simulator.batch import batch_learner
+from shift_simulator.compare import rewards_of
+from shift_simulator.draws import session_seeds
+from shift_simulator.dynamics import simulate
+from shift_simulator.users import PAPER_USERS, paper_user
+
+LIVE_MS, SIMULATED_MS = 2.0, 0.2
+
+
+def live(name: str, interactions: int = 100) -> tuple[list[float], int]:
+    """Milliseconds per decision along a real course of events, and the size of the memory at the end in bytes."""
+    context = Context(Study.model_validate({"study": "s", "learner": {"name": name}}))
+    learner, memory = learner_named(name), learner_named(name).initial(context)
+    trace = simulate(paper_user("B"), context.study, batch_learner(context, 1), session_seeds(1, 1), interactions)
+    times = []
+    for n in range(interactions):
+        triple, action = int(trace.triple[n, 0]), int(trace.action[n, 0])
+        taken = Taken(n + 1, triple, context.suggestions[triple], action, 1.0)
+        begin = time.perf_counter()
+        memory = learner.decided(context, memory, taken)
+        for state in range(30):
+            learner.row(context, memory, state)
+        memory = learner.rewarded(context, memory, taken, float(trace.reward[n, 0]), None)
+        for state in range(30):
+            learner.row(context, memory, state)
+        times.append((time.perf_counter() - begin) * 1e3)
+    return times, len(json.dumps(learner.dump(memory)))
+
+
+def main() -> int:
+    """Measure, print, judge."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=1000)
+    runs = parser.parse_args().runs
+    simulated = []
+    for user in PAPER_USERS:
+        begin = time.process_time()
+        rewards = rewards_of("planner", paper_user(user), 1, runs)[-1]
+        simulated.append((time.process_time() - begin) / runs / 100 * 1e3)
+        error = rewards.std() / runs**0.5
+        print(f"user {user}   R {rewards.mean():6.2f} +- {error:.2f}   {simulated[-1]:.3f} ms a decision", flush=True)
+    times, size = live("planner")
+    print(f"live     {statistics.median(times):.2f} ms a decision ({min(times):.2f} to {max(times):.2f}); {size} bytes")
+    return int(statistics.median(times) >= LIVE_MS or statistics.median(simulated) >= SIMULATED_MS)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
