@@ -75,7 +75,9 @@ class Reader:
                 self.bus.subscribe(f"{ROOT}/*/{subject}", self._hint)
 
     async def run(self) -> None:
-        """Pull every owner for ever."""
+        """Pull every owner for ever, the recorder first: no session is known before it said so."""
+        if "recorder" in self.owners:
+            await self.pull("recorder")
         while True:
             await asyncio.gather(*(self.pull(owner) for owner in self.owners))
             await asyncio.sleep(PULL_EVERY_S)
@@ -171,14 +173,16 @@ class Reader:
                 return True
 
     def _taken(self, owner: str, page: OutboxPage) -> bool:
-        """Take a page in; whether all of it is. What its reader holds back is asked for later, not again and again."""
+        """Take a page in; whether to go on. What is held back is asked for later, not again and again."""
         try:
             for row in page.rows:
                 self._take(owner, row)
         except MalformedMessage:
             self.dropped("malformed")
             return False
-        return all(r.session in self.done or self.cursors.get((r.session, owner), 0) >= r.seq for r in page.rows)
+        return page.complete or all(
+            r.session in self.done or self.cursors.get((r.session, owner), 0) >= r.seq for r in page.rows
+        )
 
     async def _page(self, owner: str, query: OutboxQuery) -> OutboxPage | None:
         key = build_key(ServiceKey(owner, "outbox"))

@@ -1,0 +1,70 @@
+"""``shift-mesh info``: what a recording says of itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+    from shift_recorder.info import RecordingInfo
+
+
+def info(
+    file: Annotated[Path, typer.Argument(help="The recording.", exists=True, dir_okay=False, envvar="SHIFT_FILE")],
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
+) -> None:
+    """Show whose recording it is, how long, how many messages of what, and whether it is whole.
+
+    Exit code 1 where it is damaged or is not what its checksum says.
+
+    \b
+    shift-mesh info data/recordings/s1.mcap
+    shift-mesh info s1.mcap --json | jq .counts
+    """
+    import json
+
+    from rich.console import Console
+    from shift_recorder.info import info_of
+
+    found = info_of(file)
+    if as_json:
+        typer.echo(json.dumps(found.as_json(), ensure_ascii=False))
+    else:
+        console = Console()
+        console.print(_about(found))
+        console.print(_counts(found))
+    raise typer.Exit(1 if found.damaged or found.checksum == "differs" else 0)
+
+
+def _about(found: RecordingInfo) -> Table:
+    from rich.markup import escape
+    from rich.table import Table
+
+    whole = "complete" if found.complete else f"incomplete: {found.reason}"
+    rows = {
+        "session": found.session, "participant": found.participant, "study": found.study,
+        "condition": found.condition or "-", "seed": "-" if found.seed is None else str(found.seed),
+        "started": found.started, "ended": found.ended or "-", "duration": f"{found.duration_s:.1f} s",
+        "state": f"damaged: {found.reason}" if found.damaged else whole,
+        "checksum": {"matches": "matches", "missing": "none beside the file"}.get(found.checksum, "differs"),
+        "written by": found.library,
+    }  # fmt: skip
+    table = Table(title=escape(f"{found.file}, {found.bytes:,} bytes"), show_header=False, title_justify="left")
+    for name, value in rows.items():
+        table.add_row(name, escape(value))
+    return table
+
+
+def _counts(found: RecordingInfo) -> Table:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table("topic or attachment", "messages", "bytes")
+    for topic, n in found.counts.items():
+        table.add_row(escape(topic), str(n), "")
+    for name, size in found.attachments.items():
+        table.add_row(escape(name), "", f"{size:,}")
+    return table

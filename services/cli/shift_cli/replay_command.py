@@ -1,0 +1,188 @@
+"""``shift-mesh replay``: a recording on the bus again, under a session of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from shift_recorder.replay import Extent, Pacer, Publish, Replay
+
+LISTEN = "tcp/127.0.0.1:0"
+"""As a peer: a session that listens nowhere waits for its router for ever."""
+CONNECT_WAIT_S = 5.0
+"""How long the router may take to be reached; chosen, as the mesh's start."""
+START_KEYS, TOGGLE_KEYS = "\n\r", "p "
+
+
+def replay(
+    file: Annotated[Path, typer.Argument(help="The recording.", exists=True, dir_okay=False, envvar="SHIFT_FILE")],
+    rate: Annotated[float, typer.Option(help="Times real time.", envvar="SHIFT_RATE")] = 1.0,
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.", envvar="SHIFT_LOOP")] = False,
+    start_offset: Annotated[
+        float, typer.Option(help="Begin so many seconds into the recording.", envvar="SHIFT_START_OFFSET")
+    ] = 0.0,
+    topics: Annotated[str, typer.Option(help="Only these, with commas between.", envvar="SHIFT_TOPICS")] = "",
+    start_paused: Annotated[
+        bool, typer.Option("--start-paused", help="Wait for Enter.", envvar="SHIFT_START_PAUSED")
+    ] = False,
+    session: Annotated[
+        str, typer.Option(help="Session to replay under; left out: one of its own.", envvar="SHIFT_REPLAY_SESSION")
+    ] = "",
+    zenoh: Annotated[
+        str, typer.Option(help="Endpoint of the mesh's router.", envvar="SHIFT_ZENOH")
+    ] = "tcp/127.0.0.1:7447",
+) -> None:
+    """Publish a recording's messages again, each in its time, marked as a replay.
+
+    No service applies what is replayed: a replayed reward never reaches a learner. On a terminal, p or
+    space pauses and goes on; Ctrl-C ends.
+
+    \b
+    shift-mesh replay data/recordings/s1.mcap
+    shift-mesh replay s1.mcap --rate 10 --topics decision,performance
+    shift-mesh replay s1.mcap --start-offset 60 --start-paused --session again
+    """
+    import asyncio
+
+    from shift_recorder.replay import Replay, extent_of, replay_session
+    from shift_schemas.errors import Conflict
+    from shift_schemas.keys import SUBJECTS
+
+    extent = extent_of(file)
+    wanted = tuple(name.strip() for name in topics.split(",") if name.strip()) or SUBJECTS
+    plan = Replay(file, session or replay_session(extent.session), rate, start_offset, wanted, loop)
+    if plan.session == extent.session:
+        raise Conflict(f"{plan.session} is the recorded session itself; a replay needs another name")
+    published = asyncio.run(_run(plan, extent, zenoh, start_paused))
+    typer.echo(f"{published} messages replayed under session {plan.session}", err=True)
+
+
+async def _run(plan: Replay, extent: Extent, zenoh: str, start_paused: bool) -> int:
+    """Replay until the end or Ctrl-C; how many messages."""
+    import asyncio
+    import contextlib
+    import signal
+
+    from shift_recorder.replay import Pacer, check_free
+    from shift_runtime.zenoh_bus import ZenohBus
+
+    bus = await ZenohBus.open(zenoh, LISTEN)
+    loop = asyncio.get_running_loop()
+    playing: asyncio.Task[int] | None = None
+    counted = [0]
+    try:
+        await _connected(bus, zenoh)
+        await check_free(bus, plan.session)
+        pacer = Pacer(plan.rate, loop.time, paused=start_paused)
+        playing = asyncio.create_task(_playing(bus, plan, extent, pacer, counted))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, playing.cancel)
+        with _keys(pacer, playing), contextlib.suppress(asyncio.CancelledError):
+            await playing
+    finally:
+        await bus.close()
+    return counted[0]
+
+
+async def _connected(bus: Any, zenoh: str) -> None:
+    import asyncio
+
+    from shift_schemas.errors import Unavailable
+
+    for _ in range(int(CONNECT_WAIT_S / 0.05)):
+        if bus.session.info.routers_zid() or bus.session.info.peers_zid():
+            return
+        await asyncio.sleep(0.05)
+    raise Unavailable(f"there is no router at {zenoh}; start the mesh, or name its router with --zenoh")
+
+
+def _waiting_put(bus: Any) -> Publish:
+    """A replay has time: under load it waits for its listeners, where a live fact is only a hint and is dropped."""
+    from functools import partial
+
+    import zenoh
+
+    put: Publish = partial(bus.session.put, congestion_control=zenoh.CongestionControl.BLOCK)
+    return put
+
+
+async def _playing(bus: Any, plan: Replay, extent: Extent, pacer: Pacer, counted: list[int]) -> int:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from shift_recorder.replay import play
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s"))
+    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task(f"{plan.path.name} at {plan.rate:g}x as {plan.session}", total=extent.length_s)
+
+        def shown(position_s: float, published: int) -> None:
+            counted[0] = published
+            bar.update(task, completed=position_s)
+
+        return await play(_waiting_put(bus), plan, extent, pacer, shown)
+
+
+def _keys(pacer: Pacer, playing: Any) -> Any:
+    """What is typed: keys on a terminal; else, where the replay waits to start, a line."""
+    import contextlib
+    import sys
+
+    if sys.stdin is not None and sys.stdin.isatty():
+        return _terminal(pacer)
+    return _line(pacer, playing) if pacer.paused else contextlib.nullcontext()
+
+
+def _terminal(pacer: Pacer) -> Any:
+    import asyncio
+    import contextlib
+    import os
+    import sys
+    import termios
+    import tty
+    from collections.abc import Iterator
+
+    @contextlib.contextmanager
+    def held() -> Iterator[None]:
+        descriptor = sys.stdin.fileno()
+        before = termios.tcgetattr(descriptor)
+        loop = asyncio.get_running_loop()
+
+        def typed() -> None:
+            for key in os.read(descriptor, 64).decode(errors="replace").lower():
+                if key in TOGGLE_KEYS or (key in START_KEYS and pacer.paused):
+                    pacer.toggle()
+
+        tty.setcbreak(descriptor)
+        loop.add_reader(descriptor, typed)
+        try:
+            yield
+        finally:
+            loop.remove_reader(descriptor)
+            termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
+
+    return held()
+
+
+def _line(pacer: Pacer, playing: Any) -> Any:
+    """A thread that waits for one line. At the end of the input nothing can start the replay: it ends."""
+    import asyncio
+    import contextlib
+    import sys
+    import threading
+
+    loop = asyncio.get_running_loop()
+
+    def started() -> None:
+        if pacer.paused:
+            pacer.toggle()
+
+    def wait() -> None:
+        line = sys.stdin.readline() if sys.stdin is not None else ""
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the replay was ended
+            loop.call_soon_threadsafe(started if line else playing.cancel)
+
+    threading.Thread(target=wait, daemon=True).start()
+    return contextlib.nullcontext()

@@ -1,0 +1,125 @@
+"""What a recording says of itself, without deriving anything."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from shift_schemas.errors import DamagedRecording, MalformedMessage
+from shift_schemas.messages import Session
+from shift_schemas.stamps import NS
+
+from shift_recorder.checksum import check
+from shift_recorder.reading import Recording, fact_of
+from shift_recorder.writing import SESSION_METADATA
+
+
+@dataclass(frozen=True)
+class RecordingInfo:
+    """One recording.
+
+    ``complete`` is whether the session ended and the file is whole; ``reason`` says why it is not, or how
+    it is damaged. ``duration_s`` is from the first message's recording to the last one's.
+    """
+
+    file: str
+    bytes: int
+    library: str
+    session: str
+    participant: str
+    study: str
+    condition: str
+    seed: int | None
+    state: str
+    started: str
+    ended: str
+    duration_s: float
+    counts: dict[str, int]
+    attachments: dict[str, int]
+    metadata: dict[str, dict[str, str]]
+    checksum: str
+    complete: bool
+    damaged: bool
+    reason: str
+
+    def as_json(self) -> dict[str, Any]:
+        """For ``--json``; the study's text, long and among the attachments, is left out."""
+        metadata = {name: {k: v for k, v in values.items() if k != "study" or name == SESSION_METADATA}
+                    for name, values in self.metadata.items()}  # fmt: skip
+        return asdict(self) | {"metadata": metadata}
+
+
+@dataclass
+class _Scanned:
+    """What one pass finds."""
+
+    counts: Counter[str]
+    first: int = 0
+    last: int = 0
+    session: Session | None = None
+
+
+def info_of(path: Path) -> RecordingInfo:
+    """Read a recording once. One that is damaged or cut off is told of as far as it can be read.
+
+    Raises
+    ------
+    UnknownThing
+        There is no such file.
+    """
+    checksum = _checksum(path)
+    recording = Recording(path)
+    scanned = _scanned(recording)
+    said, fact, report = recording.metadata.get(SESSION_METADATA, {}), scanned.session, recording.report
+    ended = fact is not None and fact.state == "ended"
+    return RecordingInfo(
+        file=path.name,
+        bytes=path.stat().st_size,
+        library=recording.library,
+        session=fact.session if fact else said.get("session", ""),
+        participant=fact.participant if fact else said.get("participant", ""),
+        study=fact.study if fact else said.get("study", ""),
+        condition=(fact.condition or "") if fact else said.get("condition", ""),
+        seed=fact.seed if fact else None,
+        state=fact.state if fact else "",
+        started=_iso(fact.started.ns) if fact else "",
+        ended=_iso(fact.ended.ns) if fact and fact.ended else "",
+        duration_s=max(0, scanned.last - scanned.first) / NS,
+        counts=dict(scanned.counts),
+        attachments={name: len(a.data) for name, a in recording.attachments.items()},
+        metadata=recording.metadata,
+        checksum=checksum,
+        complete=report.complete and ended,
+        damaged=report.damaged,
+        reason=report.reason or ("" if ended else "the session has not ended"),
+    )
+
+
+def _checksum(path: Path) -> str:
+    try:
+        return check(path).value
+    except DamagedRecording:
+        return "differs"
+
+
+def _scanned(recording: Recording) -> _Scanned:
+    found = _Scanned(Counter())
+    try:
+        for message in recording.messages():
+            found.counts[message.topic] += 1
+            found.first = found.first or message.log_time
+            found.last = message.log_time
+            if message.topic == "session":
+                fact = fact_of(message.topic, message.data)
+                found.session = fact if isinstance(fact, Session) else found.session
+    except (DamagedRecording, MalformedMessage):
+        pass  # the report has it
+    return found
+
+
+def _iso(ns: int) -> str:
+    """UTC, milliseconds."""
+    return datetime.fromtimestamp(ns / NS, UTC).isoformat(timespec="milliseconds")

@@ -1,0 +1,218 @@
+"""Replay: a recording's facts on the bus again, at their own pace, under a session of its own.
+
+What is replayed is marked: the session's fact names the recording (``replay_of``), and each publication
+carries ``replay:SEQUENCE`` as its attachment, which the readers of services and doors pass over
+(``shift_runtime.reader``). So every tool that listens hears a replay, and no learner learns from it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from collections.abc import AsyncIterator, Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from shift_runtime.bus import Bus
+from shift_runtime.reader import REPLAY_MARK
+from shift_schemas.codec import decode, encode, encoding_of
+from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, shorten
+from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.keys import SUBJECTS, FactKey, ServiceKey, build_key
+from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, Session
+from shift_schemas.stamps import NS
+
+from shift_recorder.reading import RecordedFact, Recording
+
+LONGEST_ID = 63
+Progress = Callable[[float, int], None]
+"""Told the position in the recording, s, and how many facts were published."""
+
+
+class Publish(Protocol):
+    """How a fact is put on a bus: :meth:`shift_runtime.bus.Bus.put`, or one that rather waits than drops."""
+
+    def __call__(self, key: str, payload: bytes, /, *, encoding: str = "", attachment: bytes = b"") -> None:
+        """Publish."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """What to replay, and how.
+
+    Raises
+    ------
+    MalformedMessage
+        Something of it cannot be.
+    """
+
+    path: Path
+    session: str
+    rate: float = 1.0
+    start_offset_s: float = 0.0
+    topics: tuple[str, ...] = SUBJECTS
+    loop: bool = False
+
+    def __post_init__(self) -> None:
+        """Check it."""
+        if not is_id(self.session):
+            raise MalformedMessage(f"{shorten(self.session)!r} is no id: {ID_RULE}")
+        if not 0 < self.rate <= 10_000:
+            raise MalformedMessage(f"a rate of {self.rate:g} cannot be; write a number above 0, 1 for real time")
+        if not 0 <= self.start_offset_s < 1e9:
+            raise MalformedMessage(f"a start {self.start_offset_s:g} s into the recording cannot be")
+        if unknown := [topic for topic in self.topics if topic not in SUBJECTS]:
+            raise MalformedMessage(f"{shorten(unknown[0])!r} is no topic; there are {', '.join(SUBJECTS)}")
+
+
+@dataclass(frozen=True)
+class Extent:
+    """Of a recording: whose it is, when it begins, ns, and how long it is, s."""
+
+    session: str
+    first_ns: int
+    length_s: float
+    topics: Collection[str]
+
+
+class Pacer:
+    """Time that runs at a rate and can stand still.
+
+    Parameters
+    ----------
+    now
+        Seconds of a clock that only rises.
+    """
+
+    def __init__(self, rate: float, now: Callable[[], float], paused: bool = False) -> None:
+        self._rate = rate
+        self._now = now
+        self._at = 0.0
+        self._since: float | None = None if paused else now()
+        self._changed = asyncio.Event()
+
+    @property
+    def paused(self) -> bool:
+        """Whether time stands still."""
+        return self._since is None
+
+    @property
+    def position_s(self) -> float:
+        """Recorded seconds that have passed."""
+        return self._at if self._since is None else self._at + (self._now() - self._since) * self._rate
+
+    def toggle(self) -> None:
+        """Stand still, or go on from here."""
+        self._at, self._since = self.position_s, (self._now() if self.paused else None)
+        self._changed.set()
+
+    def seek(self, position_s: float) -> None:
+        """Be at another position, paused or not as before."""
+        self._at, self._since = position_s, (None if self.paused else self._now())
+        self._changed.set()
+
+    async def until(self, position_s: float) -> None:
+        """Return when the position is reached."""
+        while (left_s := position_s - self.position_s) > 0 or self.paused:
+            self._changed.clear()
+            wait = self._changed.wait()
+            if self.paused:
+                await wait
+                continue
+            try:
+                await asyncio.wait_for(wait, left_s / self._rate)
+            except TimeoutError:
+                continue
+
+
+def replay_session(recorded: str) -> str:
+    """A session id for a replay of ``recorded``: nobody else's."""
+    tail = secrets.token_hex(3)
+    return f"replay-{recorded[: LONGEST_ID - len('replay-') - len(tail) - 1]}-{tail}"
+
+
+def extent_of(path: Path) -> Extent:
+    """One pass over the recording.
+
+    Raises
+    ------
+    DamagedRecording
+        It is damaged, or holds nothing.
+    UnknownThing
+        There is no such file.
+    """
+    recording, first, last, session = Recording(path), 0, 0, ""
+    topics = set()
+    for message in recording.messages():
+        first, last = first or message.log_time, max(last, message.log_time)
+        topics.add(message.topic)
+    session = recording.metadata.get("shift:session", {}).get("session", "")
+    if not topics:
+        raise DamagedRecording(f"{path.name} holds no messages")
+    return Extent(session, first, (last - first) / NS, frozenset(topics))
+
+
+async def check_free(bus: Bus, session: str) -> None:
+    """Raise :class:`Conflict` where the mesh has a session of that name: a replay is never mixed into one."""
+    query = OutboxQuery(only=[session])
+    replies = await bus.get(build_key(ServiceKey("recorder", "outbox")), encode(query), timeout_s=1.0)
+    for reply in (r for r in replies if r.ok):
+        if decode(OutboxPage, reply.payload).heads.get(session, 0):
+            raise Conflict(f"there is a session {session} already; name another one for the replay")
+
+
+async def play(put: Publish, replay: Replay, extent: Extent, pacer: Pacer, on_progress: Progress | None = None) -> int:
+    """Publish the facts, each when its time has come; how many.
+
+    Ends with the recording, or with ``loop`` only by being cancelled. Raises as :meth:`Recording.facts`.
+    """
+    published = 0
+    async for position_s, recorded in _timed(replay, extent, pacer):
+        _publish(put, replay, recorded)
+        published += 1
+        if on_progress is not None:
+            on_progress(position_s, published)
+    return published
+
+
+async def _timed(replay: Replay, extent: Extent, pacer: Pacer) -> AsyncIterator[tuple[float, RecordedFact]]:
+    """The facts, each in its time."""
+    while True:
+        pacer.seek(replay.start_offset_s)
+        count = 0
+        for position_s, recorded in _from_offset(replay, extent):
+            await pacer.until(position_s)
+            count += 1
+            yield position_s, recorded
+            if count % 256 == 0:
+                await asyncio.sleep(0)
+        if not replay.loop or not count:
+            return
+        await pacer.until(extent.length_s)
+        await asyncio.sleep(0)
+
+
+def _from_offset(replay: Replay, extent: Extent) -> Iterator[tuple[float, RecordedFact]]:
+    for recorded in Recording(replay.path).facts(replay.topics):
+        position_s = (recorded.log_time - extent.first_ns) / NS
+        if position_s >= replay.start_offset_s:
+            yield position_s, recorded
+
+
+def _publish(put: Publish, replay: Replay, recorded: RecordedFact) -> None:
+    fact = replayed(recorded.fact, replay)
+    put(
+        build_key(FactKey(replay.session, fact.subject)),
+        encode(fact),
+        encoding=encoding_of(type(fact)),
+        attachment=REPLAY_MARK + str(recorded.sequence).encode(),
+    )
+
+
+def replayed(fact: Fact, replay: Replay) -> Fact:
+    """The fact as its replay has it: of another session, which says what it replays."""
+    update = {"session": replay.session}
+    if isinstance(fact, Session):
+        update["replay_of"] = replay.path.name
+    return fact.model_copy(update=update)

@@ -1,0 +1,285 @@
+"""Whole sessions in memory: the real cores of all four services, their facts exchanged in a random order.
+
+What each owner put out waits in a queue per reader, and the next one to be read is drawn; so the services
+run ahead of each other as processes do. The facts go through segments into a finished recording.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from shift_decider import core as decider
+from shift_learner import core as learner
+from shift_monitor import core as monitor
+from shift_recorder import core as recorder
+from shift_recorder.checksum import sha256_of, write_checksum
+from shift_recorder.finishing import finish_recording
+from shift_recorder.mcap_schemas import recorded_json, subject_schemas
+from shift_recorder.parsing import Attachment
+from shift_recorder.reading import RecordedMessage, Recording
+from shift_recorder.segments import SegmentWriter
+from shift_recorder.storage import DurableFile
+from shift_recorder.writing import RecordingWriter
+from shift_schemas.keys import READS
+from shift_schemas.messages import (
+    Command,
+    Configure,
+    Decide,
+    EndSession,
+    Fact,
+    GazeChunk,
+    Mark,
+    ReportPerformance,
+    Result,
+    Seen,
+    SetOverride,
+    StartSession,
+)
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import NotYet
+from shift_schemas.study_text import study_from_json
+
+CORES: dict[str, Callable[..., Any]] = {
+    "recorder": recorder.step, "monitor": monitor.step, "decider": decider.step, "learner": learner.step,
+}  # fmt: skip
+START = 1_700_000_000_000_000_000
+SCHEMAS = subject_schemas()
+
+
+class Session:
+    """One session of study ``study``; its random order is ``seed``'s."""
+
+    def __init__(self, study: dict[str, Any] | None = None, seed: int = 1) -> None:
+        self.rng = random.Random(seed)
+        self.now_ns = START
+        self.states: dict[str, Any] = dict.fromkeys(CORES)
+        self.heads = dict.fromkeys(CORES, 0)
+        self.unread = {(r, o): deque[Fact]() for r, owners in READS.items() for o in owners if r != "recorder"}
+        self.recorded: list[tuple[str, int, Fact]] = []
+        self.unrecorded = {owner: deque[tuple[int, Fact]]() for owner in CORES}
+        self.answered = Seen(config=1)
+        self.gaze_s = 0.0
+        self.chunks = 0
+        self.do("recorder", StartSession(command_id="start", session="s1", participant="P01", seed=7,
+                                         study={"study": "test", "tasks": ["a", "b"], **(study or {})}))  # fmt: skip
+
+    def do(self, owner: str, message: Fact | Command | GazeChunk, late: bool = False) -> tuple[Fact, ...]:
+        """Step a core and put out what it gives."""
+        self.now_ns += 1_000_000
+        step = CORES[owner](self.states[owner], message, Stamp.of(self.now_ns), late=late)
+        self.states[owner] = step.state
+        for fact in step.facts:
+            self._put(owner, fact)
+        return tuple(step.facts)
+
+    def _put(self, owner: str, fact: Fact) -> None:
+        self.heads[owner] += 1
+        self.unrecorded[owner].append((self.heads[owner], fact))
+        for (_, of), queue in self.unread.items():
+            if of == owner:
+                queue.append(fact)
+
+    def deliver(self, most: int = 10**9) -> None:
+        """Let services read, in a random order, at most so many facts."""
+        for _ in range(most):
+            ready = [k for k, queue in self.unread.items() if queue and (k[1] == "recorder" or self._begun(k[0]))]
+            if not ready:
+                return
+            reader, owner = self.rng.choice(ready)
+            fact = self.unread[reader, owner].popleft()
+            if fact.subject in READS[reader][owner]:
+                self.do(reader, fact)
+
+    def _begun(self, reader: str) -> bool:
+        """Whether a service knows the session, and its configuration where it cannot do without."""
+        state = self.states[reader]
+        return state is not None and bool(reader == "decider" or state.config)
+
+    def record(self, most: int = 10**9) -> None:
+        """Let the recorder read, in a random order of owners."""
+        for _ in range(most):
+            ready = [o for o, queue in self.unrecorded.items() if queue]
+            if not ready:
+                return
+            owner = self.rng.choice(ready)
+            sequence, fact = self.unrecorded[owner].popleft()
+            self.recorded.append((fact.subject, sequence, fact))
+
+    def gaze(self, source: str = "tx300") -> None:
+        """A chunk of ten points around a random place, some of them lost."""
+        x = self.rng.random()
+        t, xs, valid = [], [], []
+        for _ in range(10):
+            self.gaze_s += 1 / 60
+            t.append(self.gaze_s)
+            xs.append(x + self.rng.gauss(0, 0.002))
+            valid.append(self.rng.random() > 0.05)
+        points = [p if ok else None for p, ok in zip(xs, valid, strict=True)]
+        self.do("monitor", GazeChunk(source=source, seq=self.chunks, t=t, x=points, y=points, valid=valid))
+        self.answered = self.answered.model_copy(update={"gaze": {**self.answered.gaze, source: self.chunks}})
+        self.chunks += 1 if self.rng.random() > 0.05 else 3  # some are lost on the way
+
+    def decide(self, n: int, late: bool) -> None:
+        """Ask for decision ``n``; ``late``: do not wait for what it needs."""
+        command = Decide(command_id=f"d{n}", session="s1", task=self.rng.choice("ab"), need=self.answered)
+        while True:
+            try:
+                self.do("decider", command, late=late)
+                break
+            except NotYet:
+                self.deliver(1)
+        self.answered = self.answered.model_copy(update={"decision": n})
+
+    def report(self, n: int) -> None:
+        """Tell how decision ``n`` went."""
+        results = [Result(success=self.rng.random() > 0.4, duration_s=self.rng.uniform(0, 9)) for _ in range(2)]
+        command = ReportPerformance(
+            command_id=f"d{n}", session="s1", need=self.answered, comprehension=results[0], enabledness=results[1]
+        )
+        while True:
+            try:
+                self.do("learner", command)
+                break
+            except NotYet:
+                self.deliver(1)
+        self.answered = self.answered.model_copy(update={"performance": n})
+
+    def change(self, n: int) -> None:
+        """Change the configuration."""
+        weight = {"strategies": {"negation": {"weight": 1 + n / 20}}}
+        patch = {"capacity": {"recovery": 0.3 + n / 1000}, "scoring": weight}
+        facts = self.do("recorder", Configure(command_id=f"c{n}", session="s1", patch=patch))
+        self.answered = self.answered.model_copy(update={"config": facts[0].version})  # type: ignore[attr-defined]
+
+    def override(self, n: int) -> None:
+        """Choose a task's next strategy."""
+        strategy = {"negation": "negation", "hesitation": "none"}
+        command = SetOverride(command_id=f"o{n}", session="s1", task="a", strategy=strategy, reason="so")
+        self.do("decider", command, late=True)
+
+    def interactions(self, count: int) -> Session:
+        """So many, with all that can happen."""
+        self.deliver()
+        for n in range(1, count + 1):
+            for _ in range(self.rng.randrange(5)):
+                self.gaze("tx300" if n < count / 2 else "spare")
+                self.deliver(self.rng.randrange(4))
+            if n % 11 == 3:
+                self.override(n)
+            if n % 13 == 4:
+                self.change(n)
+            if n % 17 == 5:
+                self.do("recorder", Mark(command_id=f"m{n}", session="s1", text="noted"))
+            self.decide(n, late=self.rng.random() < 0.15)
+            self.deliver(self.rng.randrange(6))
+            self.report(n)
+            self.record(self.rng.randrange(30))
+        return self
+
+    def ended(self) -> Session:
+        """End it, and let everybody read everything."""
+        self.do("recorder", EndSession(command_id="end", session="s1"))
+        self.deliver()
+        self.now_ns += 1_000_000
+        self._put("recorder", recorder.ended(self.states["recorder"], Stamp.of(self.now_ns)))
+        self.record()
+        return self
+
+    # --- files ---
+
+    def segment(self, folder: Path) -> Path:
+        """A segment of what was recorded, as a crash leaves it."""
+        segment = SegmentWriter(folder / "segments", "s1", SCHEMAS)
+        for i, (subject, sequence, fact) in enumerate(self.recorded):
+            log_time = START + 10**9 + i * 1_000_000
+            segment.write(subject, sequence, log_time, fact.stamp.ns, recorded_json(fact))
+        segment.flush()
+        segment.abandon()
+        return segment.path
+
+    def finished(self, folder: Path) -> Path:
+        """The recording, with its front and its checksum."""
+        done = finish_recording(
+            "s1", [self.segment(folder)], folder / "s1.mcap",
+            schemas=SCHEMAS, metadata=self.metadata(), attachments=self.attachments(),
+        )  # fmt: skip
+        return done.path
+
+    def metadata(self) -> dict[str, dict[str, str]]:
+        """As the recorder's shell writes it."""
+        state: recorder.RecorderState = self.states["recorder"]
+        fact = state.fact
+        return {
+            "shift:session": {
+                "session": "s1", "participant": fact.participant, "study": fact.study, "condition": "",
+                "seed": str(fact.seed), "started": f"{fact.started.sec}.{fact.started.nsec:09d}", "ended": "",
+                "replay_of": "", "software": f"shift-mesh/{fact.software}", "revision": "",
+            },
+            "shift:config": {"version": str(state.config.version), "study": state.config.study},
+        }  # fmt: skip
+
+    def attachments(self) -> list[Attachment]:
+        """As the recorder's shell writes them."""
+        state: recorder.RecorderState = self.states["recorder"]
+        policies = [recorded_json(fact) for subject, _, fact in self.recorded if subject == "policy"]
+        table = study_from_json(state.config.study).scoring.table.model_dump_json().encode()
+        files = {"study.json": state.original.encode(), "scoring-table.json": table}
+        if policies:
+            files |= {"policy-first.json": policies[0], "policy-last.json": policies[-1]}
+        return [Attachment(name, "application/json", data, START) for name, data in files.items()]
+
+
+Edit = Callable[[list[RecordedMessage]], Iterable[RecordedMessage]]
+
+
+def rewritten(recording: Path, folder: Path, edit: Edit, checksum: bool = True) -> Path:
+    """The recording with its messages edited: everything else valid, checksums and all."""
+    source = Recording(recording)
+    messages = list(source.messages())
+    folder.mkdir(exist_ok=True)
+    target = folder / recording.name
+    file = DurableFile(target, new=False)
+    writer = RecordingWriter(file, SCHEMAS, 2**20)
+    for name, values in source.metadata.items():
+        writer.metadata(name, values)
+    for attachment in source.attachments.values():
+        writer.attachment(attachment)
+    for message in edit(messages):
+        writer.message(*message)
+    writer.finish()
+    file.close()
+    if checksum:
+        write_checksum(target, sha256_of(target))
+    return target
+
+
+def changed(subject: str, number: int, path: Sequence[str | int], change: Callable[[Any], Any]) -> Edit:
+    """An edit of one field of the ``number``-th message (from 0) of a subject."""
+
+    def edit(messages: list[RecordedMessage]) -> list[RecordedMessage]:
+        place = [i for i, m in enumerate(messages) if m.topic == subject][number]
+        data = json.loads(messages[place].data)
+        inner = data
+        for key in path[:-1]:
+            inner = inner[key]
+        before = inner.get(path[-1]) if isinstance(inner, dict) else inner[path[-1]]  # type: ignore[arg-type]
+        inner[path[-1]] = change(before)  # type: ignore[index]
+        messages[place] = messages[place]._replace(data=json.dumps(data).encode())
+        return messages
+
+    return edit
+
+
+def without(subject: str, number: int) -> Edit:
+    """An edit that drops one message."""
+
+    def edit(messages: list[RecordedMessage]) -> list[RecordedMessage]:
+        place = [i for i, m in enumerate(messages) if m.topic == subject][number]
+        return messages[:place] + messages[place + 1 :]
+
+    return edit
