@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 from shift_schemas.errors import ShiftError
 
-from shift_cli import doctor_command, gaze_command, simulate_command
+from shift_cli import doctor_command, gaze_command, ros2_command, simulate_command
 
 app = typer.Typer(
     name="shift-mesh",
@@ -58,6 +58,7 @@ def router() -> None:
 
 app.command("doctor")(doctor_command.doctor)
 app.command("simulate")(simulate_command.simulate)
+app.command("ros2", context_settings=ros2_command.CONTEXT)(ros2_command.ros2)
 app.add_typer(gaze_command.app, name="gaze")
 
 

@@ -1,0 +1,36 @@
+"""``shift-mesh ros2``: the bridge to ROS 2."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+CONTEXT = {"allow_extra_args": True, "ignore_unknown_options": True}
+
+
+def ros2(
+    context: typer.Context,
+    backend: Annotated[
+        str | None,
+        typer.Option(help="native: speaks rmw_zenoh itself, no ROS needed here; or rclpy.", envvar="SHIFT_BACKEND"),
+    ] = None,
+    session: Annotated[str | None, typer.Option(help="The session.", envvar="SHIFT_SESSION")] = None,
+    zenoh: Annotated[str | None, typer.Option(help="Endpoint of the mesh's router.", envvar="SHIFT_ZENOH")] = None,
+    ros_router: Annotated[
+        str | None, typer.Option(help="Router of the ROS nodes: tcp/localhost:7447.", envvar="SHIFT_ROS_ROUTER")
+    ] = None,
+) -> None:
+    """Run the bridge to ROS 2 until Ctrl-C: a node with topics and a service, for robots.
+
+    \b
+    shift-mesh ros2 --session s1                                          # begun by somebody else
+    shift-mesh ros2 --ros-args -p session:=s1 -p create_session:=true     # begun here, if need be
+    shift-mesh ros2 --backend rclpy --ros-args -r __ns:=/lab -r shift/gaze:=/tracker/gaze
+    """
+    flags = {"--backend": backend, "--session": session, "--zenoh": zenoh, "--ros-router": ros_router}
+    given = [word for flag, value in flags.items() if value is not None for word in (flag, value)]
+    sys.stdout.flush()
+    os.execv(sys.executable, [sys.executable, "-m", "shift_ros2", *given, *context.args])

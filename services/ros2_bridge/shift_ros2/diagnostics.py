@@ -1,0 +1,67 @@
+"""What came, what was dropped and why, as ``/shift/diagnostics`` tells it. Pure; time is passed in.
+
+A text at most every ``interval_s``, and only where there is news: a million bad messages are one number.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Any
+
+from shift_schemas.errors import ShiftError, shorten
+
+TOPICS = 32
+"""So many topics are counted by name; nobody fills memory with names of his own."""
+
+
+@dataclass
+class Diagnostics:
+    """Counts since the start."""
+
+    interval_s: float
+    received: Counter[str] = field(default_factory=Counter)
+    dropped: Counter[tuple[str, str]] = field(default_factory=Counter)
+    state: str = "starting"
+    _last: dict[str, Any] | None = None
+    _news: bool = True
+    _due_s: float = 0.0
+
+    def came(self, topic: str, count: int = 1) -> None:
+        """Something arrived; no news in itself."""
+        self.received[topic] += count
+
+    def lost(self, topic: str, error: ShiftError, count: int = 1, reason: str = "") -> None:
+        """Something was dropped or refused."""
+        key = (topic, reason or error.kind)
+        if key not in self.dropped and len(self.dropped) >= TOPICS:
+            key = ("other", "other")
+        self.dropped[key] += count
+        self._last = {
+            "topic": topic, "reason": reason or error.kind, "detail": shorten_detail(error.detail),
+            "errors": [e.model_dump() for e in error.errors[:3]],
+        }  # fmt: skip
+        self._news = True
+
+    def now(self, state: str) -> None:
+        """What the bridge is doing; ``ready``, or what it waits for."""
+        self._news = self._news or state != self.state
+        self.state = state
+
+    def report(self, now_s: float, **more: Any) -> str | None:
+        """The text to publish, if there is news and it is time."""
+        if not self._news or now_s < self._due_s:
+            return None
+        self._news = False
+        self._due_s = now_s + self.interval_s
+        dropped: dict[str, dict[str, int]] = {}
+        for (topic, reason), count in self.dropped.items():
+            dropped.setdefault(topic, {})[reason] = count
+        content = {"service": "ros2_bridge", **more, "state": self.state, "received": dict(self.received)}
+        return json.dumps({**content, "dropped": dropped, "last": self._last}, ensure_ascii=False)
+
+
+def shorten_detail(detail: str) -> str:
+    """A sentence at its whole; a novel not."""
+    return detail if len(detail) <= 500 else shorten(detail)

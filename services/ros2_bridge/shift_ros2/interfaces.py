@@ -1,0 +1,42 @@
+"""What the node has: topics and services by their default names. A table; both backends declare from it. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from shift_ros2.wire import STRING, TRIGGER, RosType
+
+Direction = Literal["in", "out", "service"]
+Topic = Literal[
+    "gaze", "task_performance", "task", "next_strategy", "observation", "estimate", "decision", "diagnostics"
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Interface:
+    """One topic or service. ``stream``: it takes the gaze stream's QoS."""
+
+    topic: Topic
+    direction: Direction
+    type: RosType = STRING
+    stream: bool = False
+
+    @property
+    def name(self) -> str:
+        """Its name within the namespace, before remapping."""
+        return f"shift/{self.topic}"
+
+
+INTERFACES: tuple[Interface, ...] = (
+    Interface("gaze", "in", stream=True),
+    Interface("task_performance", "in"),
+    Interface("task", "in"),
+    Interface("next_strategy", "service", TRIGGER),
+    Interface("observation", "out"),
+    Interface("estimate", "out"),
+    Interface("decision", "out"),
+    Interface("diagnostics", "out"),
+)
+PUBLISHED: frozenset[str] = frozenset({"observation", "estimate", "decision"})
+"""Facts of the mesh that are put out as topics."""

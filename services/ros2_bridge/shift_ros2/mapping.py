@@ -1,0 +1,142 @@
+"""The JSON inside ROS messages <-> messages of the mesh, strictly. Pure.
+
+The fields are those of INTERFACE.md. Each message may carry ``session``; single gaze samples have plain
+values where a chunk has lists. Errors are :class:`MalformedMessage` with field, value and rule.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any, NamedTuple, TypeVar
+
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from shift_schemas.bodies import PerformanceBody
+from shift_schemas.errors import FieldError, MalformedMessage, Problem, ShiftError, TooLarge, malformed, shorten
+from shift_schemas.ids import Id
+from shift_schemas.messages import Fact, GazeChunk, Message, Observation
+from shift_schemas.strict_json import parse_json
+
+TEXT_LIMIT = 256 * 1024
+"""As the gateway's: bytes of one message."""
+COLUMNS = ("t", "x", "y", "valid", "aoi")
+UNNUMBERED = 0
+M = TypeVar("M", bound=BaseModel)
+_ID: TypeAdapter[str] = TypeAdapter(Id)
+
+
+class GazeArrival(NamedTuple):
+    """Gaze as it came. Where it had no ``seq``, the chunk's is 0 and the bridge numbers it."""
+
+    session: str | None
+    chunk: GazeChunk
+    numbered: bool
+
+
+class TaskMessage(Message):
+    """What the next request is about."""
+
+    session: Id | None = None
+    task: Id = Field(description="The task that is to be explained.")
+
+
+class PerformanceMessage(PerformanceBody):
+    """How the task went."""
+
+    session: Id | None = None
+
+    @property
+    def body(self) -> PerformanceBody:
+        """Without the session."""
+        return PerformanceBody(
+            decision_id=self.decision_id, comprehension=self.comprehension, enabledness=self.enabledness
+        )
+
+
+def gaze_of(text: str, source: str, now_s: float) -> GazeArrival:
+    """A chunk, or a single sample as a chunk of one.
+
+    Parameters
+    ----------
+    source
+        Its source where it names none.
+    now_s
+        Its time where it is a single sample without ``t``: seconds of the bridge's clock.
+    """
+    data = _object("gaze", text)
+    session = data.pop("session", None)
+    if session is not None:
+        _checked_id("session", session)
+    numbered = data.get("seq") is not None
+    sample = not isinstance(data.get("t"), list)
+    if sample:
+        data.setdefault("t", now_s)
+        data = {k: [v] if k in COLUMNS else v for k, v in data.items()}
+    data = {**data, "source": data.get("source", source), "seq": data["seq"] if numbered else UNNUMBERED}
+    try:
+        chunk = GazeChunk.model_validate(data)
+    except ValidationError as e:
+        raise _as_sample(malformed("gaze", e)) if sample else malformed("gaze", e) from e
+    return GazeArrival(session, chunk, numbered)
+
+
+def task_of(text: str) -> TaskMessage:
+    """What ``/shift/task`` says."""
+    return _validated("task", TaskMessage, text)
+
+
+def performance_of(text: str) -> PerformanceMessage:
+    """What ``/shift/task_performance`` says."""
+    return _validated("task_performance", PerformanceMessage, text)
+
+
+def text_of_fact(fact: Fact, payload: str) -> str:
+    """A fact as its topic carries it: the message; an observation as REST answers it (no AOI is null)."""
+    if not isinstance(fact, Observation):
+        return payload
+    data = fact.model_dump(mode="json")
+    data["gaze"]["aoi"] = data["gaze"]["aoi"] or None
+    return text_of_answer(data)
+
+
+def text_of_answer(answer: dict[str, Any]) -> str:
+    """A command's result as the service's ``message``."""
+    return json.dumps(answer, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
+def text_of_error(error: ShiftError) -> str:
+    """A refusal as the service's ``message``: kind, detail and errors."""
+    return Problem.of(error).model_dump_json()
+
+
+def _object(what: str, text: str) -> dict[str, Any]:
+    if len(text) > TEXT_LIMIT:
+        raise TooLarge(f"{what}: the message is above {TEXT_LIMIT // 1024} KB; send smaller chunks")
+    data = parse_json(text)
+    if not isinstance(data, dict):
+        raise _refused(what, "data", data, "a JSON object")
+    return data
+
+
+def _validated(what: str, kind: type[M], text: str) -> M:
+    _object(what, text)
+    try:
+        return kind.model_validate_json(text)
+    except ValidationError as e:
+        raise malformed(what, e) from e
+
+
+def _checked_id(field: str, value: Any) -> None:
+    try:
+        _ID.validate_python(value, strict=True)
+    except ValidationError as e:
+        raise _refused("gaze", field, value, e.errors()[0]["msg"]) from e
+
+
+def _refused(what: str, field: str, value: Any, rule: str) -> MalformedMessage:
+    return MalformedMessage(f"{what}: {field}: {rule}", (FieldError(field=field, value=shorten(value), rule=rule),))
+
+
+def _as_sample(error: MalformedMessage) -> MalformedMessage:
+    """The fields of a sample have no index."""
+    errors = tuple(e.model_copy(update={"field": e.field.removesuffix(".0")}) for e in error.errors)
+    return MalformedMessage(f"gaze: {errors[0].field}: {errors[0].rule}", errors)

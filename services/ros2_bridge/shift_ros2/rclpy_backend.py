@@ -1,0 +1,216 @@
+"""The rclpy backend: an ordinary ROS node, over whatever RMW is installed. ``rclpy`` is imported late.
+
+Names, parameters and remaps are ours (settings), so both backends take the same command line. One thread
+spins; a request blocks it until it is answered, meanwhile the middleware keeps what arrives (``gaze_depth``).
+Coroutines in rclpy would be polled without a pause.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future
+from functools import partial
+from typing import Any
+
+from shift_schemas.errors import InvalidSettings, ShiftError, Unavailable
+
+from shift_ros2.backend import Answer, Handlers, Inbox
+from shift_ros2.interfaces import INTERFACES, Interface
+from shift_ros2.mapping import text_of_error
+from shift_ros2.ros4hri import TRACKED
+from shift_ros2.settings import BridgeSettings
+
+LONGEST_REQUEST_S = 120.0
+"""Chosen: longer than any sensible ``wait_s``; a blocked spin must end some day."""
+
+
+class RclpyBackend:
+    """See the module. Make it by :meth:`open`."""
+
+    def __init__(self, settings: BridgeSettings, handlers: Handlers, ros: Any) -> None:
+        self._settings = settings
+        self._handlers = handlers
+        self._ros = ros
+        self._loop = asyncio.get_running_loop()
+        self._inbox = Inbox(self._overflowed)
+        self._publishers: dict[str, Any] = {}
+        self._asked: set[Future[Answer]] = set()
+        self._engagements: set[str] = set()
+        self._missing = ""
+        self._closing = False
+
+    @classmethod
+    async def open(cls, settings: BridgeSettings, handlers: Handlers) -> RclpyBackend:
+        """Join the graph. Raises :class:`InvalidSettings` without ROS."""
+        backend = cls(settings, handlers, _ros())
+        backend._start()
+        return backend
+
+    def publish(self, topic: str, text: str) -> None:
+        """See :class:`~shift_ros2.backend.Backend`."""
+        if not self._closing:
+            self._publishers[topic].publish(self._ros.String(data=text))
+
+    @property
+    def state(self) -> str:
+        """See :class:`~shift_ros2.backend.Backend`. A ROS graph has no place that one could wait for."""
+        return ""
+
+    async def close(self) -> None:
+        """See :class:`~shift_ros2.backend.Backend`."""
+        self._closing = True
+        for asked in list(self._asked):
+            asked.cancel()
+        await asyncio.to_thread(self._stop)
+
+    # --- life ---
+
+    def _start(self) -> None:
+        ros, settings = self._ros, self._settings
+        self._context = ros.Context()
+        ros.rclpy.init(
+            args=[], context=self._context, domain_id=settings.domain,
+            signal_handler_options=ros.SignalHandlerOptions.NO,
+        )  # fmt: skip
+        self._node = ros.rclpy.create_node(
+            settings.node, namespace=settings.namespace, context=self._context, use_global_arguments=False,
+            start_parameter_services=False,
+        )  # fmt: skip
+        for interface in INTERFACES:
+            self._declare(interface, settings.names[interface.topic])
+        if settings.ros4hri:
+            self._declare_ros4hri()
+        self._executor = ros.SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        while not self._closing and self._context.ok():
+            try:
+                self._executor.spin_once(timeout_sec=0.5)
+            except self._ros.ExternalShutdownException:
+                return
+
+    def _stop(self) -> None:
+        self._executor.wake()
+        self._thread.join(5.0)
+        self._executor.shutdown(0.5)
+        self._node.destroy_node()
+        self._ros.rclpy.try_shutdown(context=self._context)
+
+    def _declare(self, interface: Interface, name: str) -> None:
+        match interface.direction:
+            case "in":
+                take = self._on_message(interface.topic)
+                self._node.create_subscription(self._ros.String, name, take, self._qos(interface))
+            case "out":
+                self._publishers[interface.topic] = self._node.create_publisher(
+                    self._ros.String, name, self._qos(interface)
+                )
+            case "service":
+                self._node.create_service(self._ros.Trigger, name, self._on_trigger)
+
+    def _qos(self, interface: Interface) -> Any:
+        settings = self._settings
+        word = settings.gaze_reliability if interface.stream else settings.reliability
+        policy = self._ros.ReliabilityPolicy
+        return self._ros.QoSProfile(
+            depth=settings.gaze_depth if interface.stream else settings.depth,
+            reliability=policy.RELIABLE if word == "reliable" else policy.BEST_EFFORT,
+        )
+
+    # --- arrivals, in rclpy's thread; handed over to the loop ---
+
+    def _on_message(self, topic: str) -> Callable[[Any], None]:
+        def on_message(message: Any) -> None:
+            text = message.data
+            self._inbox.put(topic, lambda: self._guarded(topic, lambda: self._handlers.on_text(topic, text)))
+
+        return on_message
+
+    def _on_trigger(self, request: Any, response: Any) -> Any:
+        asked: Future[Answer] = Future()
+        self._asked.add(asked)
+        if not self._inbox.put("next_strategy", lambda: self._ask(asked)):
+            asked.cancel()
+        try:
+            response.success, response.message = asked.result(LONGEST_REQUEST_S)
+        except (CancelledError, TimeoutError):
+            response.success, response.message = False, text_of_error(Unavailable("the bridge is busy or stopping"))
+        finally:
+            self._asked.discard(asked)
+        return response
+
+    # --- in the loop ---
+
+    def _ask(self, asked: Future[Answer]) -> None:
+        async def answer() -> None:
+            found = await self._handlers.on_request(None)
+            if not asked.done():
+                asked.set_result(found)
+
+        task = self._loop.create_task(answer())
+        asked.add_done_callback(lambda _: task)  # the future holds its task
+
+    def _guarded(self, topic: str, take: Callable[[], None]) -> None:
+        try:
+            take()
+        except ShiftError as e:
+            self._handlers.on_lost(topic, e)
+
+    def _overflowed(self, topic: str, number: int) -> None:
+        error = ShiftError("more came than could be read; it was dropped")
+        self._handlers.on_lost(topic, error, number, reason="overload")
+
+    # --- ROS4HRI, where hri_msgs is installed ---
+
+    def _declare_ros4hri(self) -> None:
+        try:
+            from hri_msgs.msg import EngagementLevel, IdsList
+        except ImportError:
+            return
+
+        def on_tracked(message: Any) -> None:
+            ids = [str(i) for i in message.ids][:256]
+            self._inbox.put(TRACKED, lambda: self._guarded(TRACKED, lambda: self._handlers.on_tracked(ids)))
+            for person in ids:
+                if person not in self._engagements and len(self._engagements) < 256:
+                    self._engagements.add(person)
+                    name = f"/humans/persons/{person}/engagement_status"
+                    self._node.create_subscription(EngagementLevel, name, on_engagement(person), 10)
+
+        def on_engagement(person: str) -> Callable[[Any], None]:
+            def on_level(message: Any) -> None:
+                take = partial(self._handlers.on_engagement, person, int(message.level))
+                self._inbox.put(TRACKED, lambda: self._guarded(TRACKED, take))
+
+            return on_level
+
+        self._node.create_subscription(IdsList, TRACKED, on_tracked, 10)
+
+
+def _ros() -> Any:
+    """What the backend uses of ROS, in one place."""
+    try:
+        import rclpy
+        from rclpy.context import Context
+        from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+        from rclpy.qos import QoSProfile, ReliabilityPolicy
+        from rclpy.signals import SignalHandlerOptions
+        from std_msgs.msg import String
+        from std_srvs.srv import Trigger
+    except ImportError as e:
+        raise InvalidSettings(
+            f"backend rclpy needs ROS 2 ({e}): source its setup.bash, or pip install shift-mesh[ros2], "
+            "or take backend native with RMW_IMPLEMENTATION=rmw_zenoh_cpp in the other nodes"
+        ) from e
+    from types import SimpleNamespace
+
+    return SimpleNamespace(
+        rclpy=rclpy, Context=Context, ExternalShutdownException=ExternalShutdownException,
+        SingleThreadedExecutor=SingleThreadedExecutor, QoSProfile=QoSProfile, ReliabilityPolicy=ReliabilityPolicy,
+        SignalHandlerOptions=SignalHandlerOptions, String=String, Trigger=Trigger,
+    )  # fmt: skip

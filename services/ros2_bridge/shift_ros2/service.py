@@ -1,0 +1,97 @@
+"""The bridge as a process: settings, its two sessions, signals."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+
+import structlog
+from shift_runtime.clock import SystemClock
+from shift_runtime.door import CommandDoor
+from shift_runtime.logs import configure_logs
+from shift_runtime.mesh_client import MeshClient
+from shift_runtime.metrics import Metrics
+from shift_runtime.replica import Replica
+from shift_runtime.zenoh_bus import ZenohBus
+from shift_schemas.codec import encode
+from shift_schemas.errors import ShiftError
+from shift_schemas.keys import ServiceKey, build_key
+from shift_schemas.messages import Health
+
+from shift_ros2.backend import Backend
+from shift_ros2.bridge import Bridge
+from shift_ros2.settings import BridgeSettings, bridge_settings
+
+log = structlog.get_logger()
+SERVICE = "ros2_bridge"
+DRAIN_S = 2.0
+
+
+def run_bridge(line: Sequence[str]) -> None:
+    """Run until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that do not do."""
+    try:
+        settings = bridge_settings(line)
+        configure_logs(SERVICE, settings)
+        asyncio.run(serve(settings))
+    except ShiftError as e:
+        sys.stderr.write(f"shift_ros2: {e.detail}\n")
+        sys.exit(2)
+
+
+async def serve(settings: BridgeSettings) -> None:
+    """The bridge on both its sides, until a signal."""
+    stop = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    bus = await ZenohBus.open(settings.zenoh, settings.listen)
+    metrics = Metrics(SERVICE)
+    replica = Replica(bus, metrics.dropped)
+    bridge = Bridge(settings, CommandDoor(MeshClient(bus, settings.patience_s), replica), metrics, SystemClock())
+    replica.reader.start()
+    pulling = asyncio.create_task(replica.reader.run())
+    try:
+        bridge.backend = await open_backend(settings, bridge)
+        _show(bus, bridge, metrics)
+        log.info(
+            "started", node=settings.node, namespace=settings.namespace, session=bridge.session,
+            backend=settings.backend, mesh=settings.zenoh,
+            ros=settings.ros_router if settings.backend == "native" else f"domain {settings.domain}",
+        )  # fmt: skip
+        running = asyncio.create_task(bridge.run())
+        stopping = asyncio.create_task(stop.wait())
+        await asyncio.wait({running, stopping}, return_when=asyncio.FIRST_COMPLETED)
+        if running.done():
+            await running
+        await bridge.drain(DRAIN_S)
+        running.cancel()
+        with suppress(asyncio.CancelledError):
+            await running
+        await bridge.backend.close()
+    finally:
+        pulling.cancel()
+        await bus.close()
+        log.info("stopped")
+
+
+async def open_backend(settings: BridgeSettings, bridge: Bridge) -> Backend:
+    """The backend that the settings name; the other one is not imported."""
+    if settings.backend == "rclpy":
+        from shift_ros2.rclpy_backend import RclpyBackend
+
+        return await RclpyBackend.open(settings, bridge)
+    from shift_ros2.native import NativeBackend
+
+    return await NativeBackend.open(settings, bridge)
+
+
+def _show(bus: ZenohBus, bridge: Bridge, metrics: Metrics) -> None:
+    def health() -> Health:
+        state = bridge.diagnostics.state
+        return Health(service=SERVICE, ready=state == "ready", detail="" if state == "ready" else state, sessions=1)
+
+    bus.serve(build_key(ServiceKey(SERVICE, "health")), lambda r: r.reply(encode(health())))
+    bus.serve(build_key(ServiceKey(SERVICE, "metrics")), lambda r: r.reply(metrics.text()))
+    bus.token(build_key(ServiceKey(SERVICE, "alive")))
