@@ -1,6 +1,8 @@
 """What a decision of the planner costs: live (one session, the whole policy) and in simulation (runs at once).
 
-    python benchmarks/learners.py [--runs 1000]
+    python benchmarks/learners.py [--runs 1000] [--families 20]
+
+``--families`` tells instead what learners get from that many people of each generated family (docs/learners.md).
 
 Live, a decision is a decided and a rewarded with the 30 rows published after each. Exit code 1 where the median is
 2 ms or more live, or 0.2 ms or more in simulation.
@@ -14,13 +16,16 @@ import statistics
 import sys
 import time
 
+import numpy as np
 from shift_learner.learner import Context, Taken
 from shift_learner.learners import learner_named
 from shift_schemas.study import Study
 from shift_simulator.batch import batch_learner
 from shift_simulator.compare import rewards_of
+from shift_simulator.deviants import FAMILIES
 from shift_simulator.draws import session_seeds
 from shift_simulator.dynamics import simulate
+from shift_simulator.optimum import optimum
 from shift_simulator.users import PAPER_USERS, paper_user
 
 LIVE_MS, SIMULATED_MS = 2.0, 0.2
@@ -50,7 +55,27 @@ def main() -> int:
     """Measure, print, judge."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=1000)
-    runs = parser.parse_args().runs
+    parser.add_argument("--families", type=int, default=0)
+    asked = parser.parse_args()
+    return families(asked.families) if asked.families else speed(asked.runs)
+
+
+def families(people: int, runs: int = 32) -> int:
+    """Mean reward per family and learner over ``people`` of it, and the mean of their exact optima."""
+    for name, family in FAMILIES.items():
+        users = [family(np.random.default_rng([2026, i])) for i in range(people)]
+        best = np.mean([optimum(user, Study(study="s"), 100) for user in users])
+        found = {
+            learner: [rewards_of(learner, user, i, runs)[-1].mean() for i, user in enumerate(users)]
+            for learner in ("planner", "q-learning", "scoring")
+        }
+        said = "   ".join(f"{k} {np.mean(v):6.1f} +- {np.std(v) / people**0.5:.1f}" for k, v in found.items())
+        print(f"{name:26}{said}   optimum {best:.1f}", flush=True)
+    return 0
+
+
+def speed(runs: int) -> int:
+    """Of the planner."""
     simulated = []
     for user in PAPER_USERS:
         begin = time.process_time()
