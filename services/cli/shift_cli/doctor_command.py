@@ -69,7 +69,10 @@ def _services(url: str) -> list[Finding]:
             ready = shift.ready()
     except Unavailable as e:
         return [Finding("gateway", False, e.detail)]
-    return [Finding(s, condition == "ready", condition) for s, condition in ready["services"].items()]
+    services = ready.get("services")
+    if not isinstance(services, dict):
+        return [Finding("gateway", False, f"what answers at {url} is no gateway; give the right one with --url")]
+    return [Finding(s, condition == "ready", str(condition)) for s, condition in services.items()]
 
 
 def _folder(data: Path) -> Finding:

@@ -26,7 +26,7 @@ from shift_runtime.reader import ReadFact
 from shift_runtime.settings import MeshSettings
 from shift_runtime.worker import Asked, Core, Worker, _Turn
 from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, Unavailable
-from shift_schemas.keys import READS, ROOT, FactKey, StreamKey, parse_key
+from shift_schemas.keys import OWNERS, READS, ROOT, FactKey, StreamKey, parse_key
 from shift_schemas.messages import Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
 from shift_schemas.study_text import study_from_json
 
@@ -78,12 +78,16 @@ class RecorderWorker(Worker[RecorderState]):
         self._writers: dict[str, SegmentWriter] = {}
         self._unflushed: dict[tuple[str, str], int] = {}
         self._ends: dict[str, list[Asked]] = {}
+        """Who waits for a session's end."""
+        self._ending: set[str] = set()
+        """Sessions whose recording is being finished; one at a time."""
 
     # --- life ---
 
     async def on_start(self) -> None:
         """Go on with ends that a crash interrupted, and flush from time to time."""
         self.bus.subscribe(f"{ROOT}/**", self._stray)
+        self.bus.subscribe(f"{ROOT}/@service/**", self._stray)  # a star takes in no part that begins with @
         for session, closed in list(self.journal.sessions()):
             state = None if closed else self._state(session)
             if state is not None and state.fact.state == "ending":
@@ -108,6 +112,8 @@ class RecorderWorker(Worker[RecorderState]):
 
     async def on_stop(self) -> None:
         """Read what is left, and finish the files of the sessions that go on later."""
+        if self._tasks:
+            await asyncio.wait(self._tasks, timeout=2 * END_WAIT_S)
         await self.reader.pull_all(self.reader.owners)
         while self._queue:
             await self._turn()
@@ -148,8 +154,16 @@ class RecorderWorker(Worker[RecorderState]):
             return
         self._take(turn, asked.session, self.core.step(state, asked.message, self.clock.now()))
         self._ends.setdefault(asked.session, []).append(asked)
-        if len(self._ends[asked.session]) == 1:
-            self._begin_end(asked.session)
+
+    def after_turn(self) -> None:
+        """Begin the ends that are committed now; who asked for one that is over gets its result."""
+        for session in list(self._ends):
+            state = self._state(session)
+            if state is None or state.fact.state == "ended":
+                for asked in self._ends.pop(session):
+                    self.enqueue(asked)
+            elif state.fact.state == "ending" and session not in self._ending:
+                self._begin_end(session)
 
     # --- recording ---
 
@@ -160,6 +174,7 @@ class RecorderWorker(Worker[RecorderState]):
         state = self._state(session)
         if state is None:
             self.metrics.dropped("refused")
+            self.reader.cursors.pop(key, None)
             return
         if state.fact.state == "ended":
             if read.owner == "recorder" and read.fact.subject == "session" and read.seq == self.journal.heads[session]:
@@ -193,7 +208,7 @@ class RecorderWorker(Worker[RecorderState]):
             except Unavailable as e:
                 self._rewind(session, e)
                 continue
-            self._alarm = ""
+            self._relieved()
             for key in mine:
                 self._unflushed.pop(key, None)
 
@@ -214,22 +229,14 @@ class RecorderWorker(Worker[RecorderState]):
     # --- ending ---
 
     def _begin_end(self, session: str) -> None:
+        self._ending.add(session)
         self._background(self._end(session))
 
     async def _end(self, session: str) -> None:
         try:
-            await self._converge(session)
-            state = self._state(session)
-            assert state is not None
-            self._write(session, state, core.ended(state, self.clock.now()), self.journal.heads[session] + 1)
-            self._flush()
-            finished = await asyncio.to_thread(self._finished, session, state)
-            if finished.missing:
-                finished = await self._refilled(session, state, finished)
-        except ShiftError as e:
-            log.warning("the session cannot end yet", session=session, error=e.detail)
-            for asked in self._ends.pop(session, []):
-                asked.refuse(e)
+            finished = await self._whole(session)
+        except Exception as e:
+            self._end_failed(session, e)
             return
         requests = [r for asked in self._ends.pop(session, []) for r in asked.requests]
         message = FinishSession(
@@ -240,19 +247,51 @@ class RecorderWorker(Worker[RecorderState]):
             counts=finished.counts,
         )
         self.enqueue(Asked(session, "end_session", message, requests))
+        self.enqueue(lambda: self._ending.discard(session))
         log.info("recording finished", session=session, file=str(finished.path), messages=sum(finished.counts.values()))
 
-    async def _refilled(self, session: str, state: RecorderState, holed: FinishedRecording) -> FinishedRecording:
-        """A segment was damaged: the journals still have what it held; record that again and finish again."""
-        log.warning("the recording has holes; reading the journals again", session=session, missing=holed.missing)
-        for owner in holed.missing:
-            self.reader.cursors[session, owner] = self.processed[session, owner] = 0
-        await self._converge(session)
-        self._write(session, state, core.ended(state, self.clock.now()), self.journal.heads[session] + 1)
-        finished = await asyncio.to_thread(self._finished, session, state)
-        if finished.missing:
-            raise DamagedRecording(f"the recording of {session} has holes: {finished.missing}")
+    def _end_failed(self, session: str, error: Exception) -> None:
+        if isinstance(error, StorageFailed):
+            self._rewind(session, error)
+        if isinstance(error, ShiftError):
+            log.warning("the session cannot end yet", session=session, error=error.detail)
+        else:
+            log.error("the session cannot end", session=session, exc_info=error)
+            error = ShiftError(f"the recorder failed to finish {session}: {type(error).__name__}; see its log")
+        self._ending.discard(session)
+        for asked in self._ends.pop(session, []):
+            asked.refuse(error)
+
+    async def _whole(self, session: str) -> FinishedRecording:
+        """The session's recording with all in it that any service put out; read again where a segment was damaged."""
+        finished = await self._recorded_to_the_end(session)
+        missing = self._missing(session, finished)
+        if missing:
+            log.warning("the recording has holes; reading the journals again", session=session, missing=missing)
+            for owner in missing:
+                self.reader.cursors[session, owner] = self.processed[session, owner] = 0
+            finished = await self._recorded_to_the_end(session)
+            missing = self._missing(session, finished)
+        if missing:
+            raise DamagedRecording(f"the recording of {session} lacks messages of the {', the '.join(missing)}")
         return finished
+
+    async def _recorded_to_the_end(self, session: str) -> FinishedRecording:
+        await self._converge(session)
+        state = self._state(session)
+        assert state is not None
+        self._write(session, state, core.ended(state, self.clock.now()), self.journal.heads[session] + 1)
+        self._flush()
+        if behind := self._behind(session):
+            raise Unavailable(self._alarm or f"the recorder has not written all of the {behind[0]}; ask again")
+        return await asyncio.to_thread(self._finished, session, state)
+
+    def _missing(self, session: str, finished: FinishedRecording) -> tuple[str, ...]:
+        """Owners of whom the recording lacks something, in its middle or at its end."""
+        heads = {owner: self.reader.pages[f"{owner}/{session}"].heads[session] for owner in OWNERS}
+        heads["recorder"] += 1  # the end, of which the recording has a version of its own
+        there = {owner: sum(finished.counts.get(subject, 0) for subject in OWNERS[owner]) for owner in OWNERS}
+        return tuple(owner for owner in OWNERS if there[owner] != heads[owner])
 
     async def _converge(self, session: str) -> None:
         """Read until every service has read the end and all that came before it."""
@@ -305,6 +344,8 @@ class RecorderWorker(Worker[RecorderState]):
 
     def _tidy(self, session: str) -> None:
         """Remove the segments that were merged."""
+        for owner in self.reader.owners:
+            self.reader.pages.pop(f"{owner}/{session}", None)
         folder: Path = self.segments / session
         shutil.rmtree(folder, ignore_errors=True)
 

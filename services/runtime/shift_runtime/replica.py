@@ -98,6 +98,8 @@ class Replica:
             The recorder cannot be asked.
         """
         if self.missing:
+            if "recorder" in self.missing:
+                await self.reader.pull("recorder")
             await self.reader.pull_all(self.missing)
         if session not in self.views:
             if not await self.reader.pull("recorder"):

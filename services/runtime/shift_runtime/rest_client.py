@@ -90,10 +90,10 @@ class RestClient:
     def ready(self) -> dict[str, Any]:
         """What ``/readyz`` says, ready or not. Raises :class:`Unavailable` without a gateway."""
         try:
-            answer: dict[str, Any] = self._http.get("/readyz", timeout=5.0).json()
-        except (httpx.HTTPError, ValueError) as e:
-            raise Unavailable(f"no gateway answers at {self.url}: {e}; start one with: shift-mesh up") from e
-        return answer
+            return self._object(self._http.get("/readyz", timeout=5.0))
+        except (httpx.HTTPError, ShiftError) as e:
+            said = e.detail if isinstance(e, ShiftError) else e
+            raise Unavailable(f"no gateway answers at {self.url}: {said}; start one with: shift-mesh up") from e
 
     def _ask(self, method: str, path: str, body: Any = None) -> dict[str, Any]:
         for attempt in self._retrying:
@@ -107,9 +107,17 @@ class RestClient:
         except httpx.TransportError as e:
             raise Unavailable(f"no gateway answers at {self.url}: {e or type(e).__name__}") from e
         if response.is_success:
-            answer: dict[str, Any] = response.json()
-            return answer
+            return self._object(response)
         raise _error_of(response)
+
+    def _object(self, response: httpx.Response) -> dict[str, Any]:
+        try:
+            answer = response.json()
+        except ValueError as e:
+            raise ShiftError(f"what answers at {self.url} is no gateway: its answer is no JSON") from e
+        if not isinstance(answer, dict):
+            raise ShiftError(f"what answers at {self.url} is no gateway: its answer is no JSON object")
+        return answer
 
 
 def _error_of(response: httpx.Response) -> ShiftError:

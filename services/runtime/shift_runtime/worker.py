@@ -54,6 +54,8 @@ log = structlog.get_logger()
 BATCH = 256
 HINT_WAIT_S = 0.05
 """How long a waiting command trusts that a hint will come before its owner's outbox is pulled."""
+CHECK_EVERY_S = 1.0
+"""How often a disk that refused is tried again; RELIABILITY.md, row 11, wants the alarm within as much."""
 STREAM_LIMIT = 5_000
 """Chunks that may wait; more are dropped and counted."""
 
@@ -134,6 +136,7 @@ class Worker(Generic[S]):
         self._wake = asyncio.Event()
         self._stopping = False
         self._alarm = ""
+        self._checking = False
         self._overload = 0
         self._tasks: set[asyncio.Task[None]] = set()
 
@@ -344,6 +347,9 @@ class Worker(Generic[S]):
             self._unknown(turn, asked, e)
         except ShiftError as e:
             self._refuse(turn, asked, e)
+        except Exception as e:  # a mistake of ours: it must not end the service for everybody else
+            log.exception("a command failed", procedure=asked.procedure, session=asked.session)
+            self._refuse(turn, asked, ShiftError(f"the {self.core.name} failed at it: {type(e).__name__}; see its log"))
         else:
             self._take(turn, asked.session, step)
             self._keep(turn, asked, step)
@@ -420,7 +426,13 @@ class Worker(Generic[S]):
             self.enqueue(asked)
 
     def _unknown(self, turn: _Turn, asked: Asked, error: UnknownThing) -> None:
-        """Before something is called unknown, the owners are asked once more; without them nobody knows."""
+        """Before something is called unknown, the owners are asked once more; without them nobody knows.
+
+        Nor does a service whose disk refuses: it cannot keep what they tell it.
+        """
+        if self._alarm:
+            self._refuse(turn, asked, Unavailable(self._alarm))
+            return
         if asked.checked or not self.reader.owners:
             self._refuse(turn, asked, error)
             return
@@ -450,9 +462,7 @@ class Worker(Generic[S]):
             except Unavailable as e:
                 self._undo(turn, e)
                 return
-            if self._alarm:
-                log.warning("the disk takes commits again")
-            self._alarm = ""
+            self._relieved()
         self._tell(turn)
 
     def _must_commit(self, turn: _Turn) -> bool:
@@ -493,6 +503,7 @@ class Worker(Generic[S]):
     def _undo(self, turn: _Turn, error: Unavailable) -> None:
         """Nothing of the turn happened: states go back, inputs are read again, askers are told."""
         self._alarm = error.detail
+        self._check_later()
         self.metrics.commit_failed()
         log.error("commit failed", error=error.detail)
         for session, state in turn.before.items():
@@ -507,3 +518,26 @@ class Worker(Generic[S]):
             asked.refuse(error)
         for asked, refused in turn.refusals:
             asked.refuse(refused)
+
+    def _check_later(self) -> None:
+        """Nobody may ask anything more while the alarm is up: so the disk is tried now and then."""
+        if not self._checking:
+            self._checking = True
+            asyncio.get_running_loop().call_later(CHECK_EVERY_S, self.enqueue, self._check)
+
+    def _check(self) -> None:
+        self._checking = False
+        if not self._alarm:
+            return
+        try:
+            self.journal.check()
+        except Unavailable as e:
+            self._alarm = e.detail
+            self._check_later()
+        else:
+            self._relieved()
+
+    def _relieved(self) -> None:
+        if self._alarm:
+            log.warning("the disk takes commits again")
+        self._alarm = ""

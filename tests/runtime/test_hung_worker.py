@@ -1,0 +1,86 @@
+"""A worker whose handler hangs: it goes silent, though its process, its session and its token live on."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+from runtime_fixtures import until_asked
+from shift_runtime.clock import SystemClock
+from shift_runtime.journal import Journal
+from shift_runtime.mesh_client import MeshClient
+from shift_runtime.metrics import Metrics
+from shift_runtime.worker import Worker
+from shift_runtime.zenoh_bus import ZenohBus
+from shift_runtime.zenoh_config import zenoh_config
+from shift_schemas.errors import Unavailable
+from shift_schemas.messages import Decide
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import Step
+from worker_rig import CORE, Notes
+
+
+class Hanging(threading.Thread):
+    """A worker in a thread and a loop of its own; a decision about the task ``hang`` hangs until it is let go."""
+
+    def __init__(self, router: str, path: Path) -> None:
+        super().__init__()
+        self.router, self.path = router, path
+        self.let_go = threading.Event()
+        self.up = threading.Event()
+
+    def step(self, state: Notes | None, message: Any, now: Stamp, late: bool = False) -> Step[Notes]:
+        if isinstance(message, Decide) and message.task == "hang":
+            self.let_go.wait(60)
+        return CORE.step(state or Notes("s1", 1), message, now, late)
+
+    def run(self) -> None:
+        asyncio.run(self._run())
+
+    async def _run(self) -> None:
+        bus = await ZenohBus.open(self.router, "tcp/127.0.0.1:0")
+        core = replace(CORE, step=self.step, reads={})
+        self.worker = Worker(core, bus, Journal(self.path, "decider"), SystemClock(), Metrics("decider"))
+        self.loop = asyncio.get_running_loop()
+        self.up.set()
+        await self.worker.run()
+        await bus.close()
+
+
+@pytest.mark.anyio
+async def test_a_hung_handler_silences_its_health_and_its_outbox_though_the_token_stays(
+    router: str, tmp_path: Path
+) -> None:
+    hanging = Hanging(router, tmp_path / "decider.sqlite")
+    hanging.start()
+    assert await asyncio.to_thread(hanging.up.wait, 30)
+    bus = await ZenohBus.open(router, "tcp/127.0.0.1:0")
+    watcher = await asyncio.to_thread(zenoh.open, zenoh_config("client", connect=router))
+    client = MeshClient(bus, patience_s=1.5)
+    try:
+        await until_asked(lambda: client.health("decider"))
+        assert (await client.command(Decide(command_id="d1", session="s1", task="any"))).seq == 1
+        with pytest.raises(Unavailable, match="the decider does not answer"):
+            await client.command(Decide(command_id="d2", session="s1", task="hang"))
+        assert await client.health("decider") is None
+        alive = await asyncio.to_thread(
+            lambda: list(watcher.liveliness().get("shift/v1/@service/decider/alive", timeout=1.0))
+        )
+        assert any(reply.ok for reply in alive)
+        hanging.let_go.set()
+        await until_asked(lambda: client.health("decider"))
+        repeat = await client.command(Decide(command_id="d2", session="s1", task="hang"))
+        assert repeat.repeat
+        assert repeat.seq == 2
+    finally:
+        hanging.let_go.set()
+        hanging.loop.call_soon_threadsafe(hanging.worker.stop)
+        await asyncio.to_thread(hanging.join, 30)
+        await bus.close()
+        watcher.close()
+    assert not hanging.is_alive()

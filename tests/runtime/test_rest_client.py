@@ -1,0 +1,175 @@
+"""The REST client, at a small HTTP server that says what it is told to."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+
+import pytest
+from shift_runtime.rest_client import RestClient
+from shift_schemas.errors import Conflict, FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
+from shift_schemas.messages import GazeChunk
+
+
+@dataclass
+class Gateway:
+    """Answers with what is in ``answers``, one after the other; the last one for ever."""
+
+    answers: list[tuple[int, Any]] = field(default_factory=lambda: [(200, {})])
+    asked: list[tuple[str, str, Any]] = field(default_factory=list)
+    port: int = 0
+
+    @property
+    def url(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    def answer(self) -> tuple[int, Any]:
+        return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
+
+
+@pytest.fixture
+def gateway() -> Iterator[Gateway]:
+    known = Gateway()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
+            known.asked.append((self.command, self.path, json.loads(body) if body else None))
+            status, content = known.answer()
+            if status == 0:  # the gateway dies in the middle of the request
+                self.connection.close()
+                return
+            text = content if isinstance(content, bytes) else json.dumps(content).encode()
+            self.send_response(status)
+            self.send_header("Content-Length", str(len(text)))
+            self.end_headers()
+            self.wfile.write(text)
+
+        do_GET = do_POST
+
+        def log_message(self, format: str, *args: Any) -> None:
+            pass
+
+        def finish(self) -> None:
+            try:
+                super().finish()
+            except (OSError, ValueError):
+                return
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+    known.port = server.server_address[1]
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+    thread.start()
+    yield known
+    server.shutdown()
+    server.server_close()
+    thread.join()
+
+
+def problem(kind: str, detail: str, status: int, errors: Any = ()) -> tuple[int, Any]:
+    return status, {"type": f"urn:shift:{kind}", "title": "", "status": status, "detail": detail, "errors": errors}
+
+
+@pytest.fixture
+def shift(gateway: Gateway) -> Iterator[RestClient]:
+    with RestClient(gateway.url + "/", patience_s=1.0) as client:
+        yield client
+
+
+def test_each_method_asks_its_path(gateway: Gateway, shift: RestClient) -> None:
+    shift.start("P1", session="s1", study="coffee", seed=7, condition=None)
+    shift.gaze("s1", GazeChunk(source="eyes", seq=0, t=[0.0], x=[0.5], y=[None]))
+    shift.decide("s1", "grasp", "d1")
+    shift.report("s1", "d1", True, 5.0, False, 6.0)
+    shift.end("s1")
+    shift.session("s1")
+    shift.observation("s1")
+    shift.config("s1")
+    assert shift.ready() == {}
+    comprehension, enabledness = {"success": True, "duration_s": 5.0}, {"success": False, "duration_s": 6.0}
+    assert gateway.asked == [
+        ("POST", "/v1/sessions", {"participant": "P1", "session": "s1", "study": "coffee", "seed": 7}),
+        ("POST", "/v1/sessions/s1/gaze", {"source": "eyes", "seq": 0, "t": [0.0], "x": [0.5], "y": [None]}),
+        ("POST", "/v1/sessions/s1/decisions", {"task": "grasp", "decision_id": "d1"}),
+        (
+            "POST",
+            "/v1/sessions/s1/performance",
+            {"decision_id": "d1", "comprehension": comprehension, "enabledness": enabledness},
+        ),
+        ("POST", "/v1/sessions/s1/end", None),
+        ("GET", "/v1/sessions/s1", None),
+        ("GET", "/v1/sessions/s1/observation", None),
+        ("GET", "/v1/sessions/s1/config", None),
+        ("GET", "/readyz", None),
+    ]
+
+
+def test_a_command_without_an_id_of_its_own_is_given_one_that_stays_in_every_attempt(
+    gateway: Gateway, shift: RestClient
+) -> None:
+    gateway.answers = [problem("unavailable", "the decider does not answer", 503), (0, None), (201, {"n": 1})]
+    assert shift.decide("s1", "grasp") == {"n": 1}
+    ids = {body["decision_id"] for _, _, body in gateway.asked}
+    assert len(gateway.asked) == 3
+    assert len(ids) == 1
+    gateway.asked.clear()
+    gateway.answers = [(0, None), (201, {})]
+    shift.start("P1")
+    assert len({body["session"] for _, _, body in gateway.asked}) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "status", "error"),
+    [("conflict", 409, Conflict), ("unknown", 404, UnknownThing), ("malformed", 422, MalformedMessage)],
+)
+def test_a_problem_arrives_as_the_error_that_it_was_and_is_not_asked_again(
+    gateway: Gateway, shift: RestClient, kind: str, status: int, error: type[ShiftError]
+) -> None:
+    errors = [{"field": "task", "value": "x", "rule": "one of them"}]
+    gateway.answers = [problem(kind, "what is wrong", status, errors)]
+    with pytest.raises(error, match="what is wrong") as found:
+        shift.decide("s1", "x")
+    assert found.value.errors == (FieldError(field="task", value="x", rule="one of them"),)
+    assert len(gateway.asked) == 1
+
+
+def test_what_stays_unavailable_is_said_in_the_end(gateway: Gateway) -> None:
+    gateway.answers = [problem("unavailable", "the monitor does not answer", 503)]
+    with RestClient(gateway.url, patience_s=0.2) as shift, pytest.raises(Unavailable, match="the monitor does not"):
+        shift.observation("s1")
+    assert len(gateway.asked) > 1
+
+
+def test_without_a_gateway_it_says_which_one_does_not_answer(gateway: Gateway) -> None:
+    with RestClient("http://127.0.0.1:1", patience_s=0.1) as shift:
+        with pytest.raises(Unavailable, match=r"no gateway answers at http://127\.0\.0\.1:1"):
+            shift.session("s1")
+        with pytest.raises(Unavailable, match="start one with: shift-mesh up"):
+            shift.ready()
+
+
+@pytest.mark.parametrize("content", [b"<html>Bad gateway</html>", b"", [], {"detail": "no type"}, "text"])
+def test_an_error_that_does_not_say_why_is_an_error_all_the_same(
+    gateway: Gateway, shift: RestClient, content: Any
+) -> None:
+    gateway.answers = [(500, content)]
+    with pytest.raises(ShiftError, match="answered 500 without saying why"):
+        shift.session("s1")
+
+
+@pytest.mark.parametrize("content", [b"<html>welcome</html>", b"", b"[1]", b'"text"'])
+def test_another_server_on_the_port_is_no_gateway(gateway: Gateway, shift: RestClient, content: bytes) -> None:
+    gateway.answers = [(200, content)]
+    with pytest.raises(ShiftError):
+        shift.session("s1")
+    with pytest.raises(Unavailable, match="no gateway answers"):
+        shift.ready()
+
+
+def test_ready_is_told_whether_it_is_so_or_not(gateway: Gateway, shift: RestClient) -> None:
+    gateway.answers = [(503, {"ready": False, "missing": ["monitor"], "services": {}})]
+    assert shift.ready()["missing"] == ["monitor"]
