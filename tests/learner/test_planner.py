@@ -126,11 +126,11 @@ def test_the_posterior_over_preferences_is_bayes_rule() -> None:
     seen = [(int(RNG.integers(30)), int(RNG.integers(6)), bool(RNG.integers(2))) for _ in range(12)]
     found = b.started(prior, 1)
     for triple, action, success in seen:
-        found = b.told(found, prior, np.array([triple]), np.array([action]), np.array([success]))
+        found = b.told(found, np.array([triple]), np.array([action]), np.array([success]))
     np.testing.assert_allclose(found.preferences[0], naive_beliefs(seen), rtol=1e-9)
     for weights in (*found.columns, found.preferences, found.experts):
         np.testing.assert_allclose(weights.sum(axis=1), 1.0)
-    assert ((b.chances(found, prior) > 0) & (b.chances(found, prior) < 1)).all()
+    assert ((found.chances > 0) & (found.chances < 1)).all()
 
 
 @pytest.mark.parametrize("strategy", [0, 1])

@@ -16,8 +16,8 @@ from shift_learner.learners.ucb1 import Ucb1
 LEARNERS: dict[str, Learner] = {
     learner.name: learner
     for learner in (
-        Scoring(),
         QLearning(),
+        Scoring(),
         EpsilonGreedy(),
         Ucb1(),
         Thompson(),

@@ -21,7 +21,7 @@ from shift_schemas.words import TRIPLES
 
 from shift_learner.learner import Context, Row, Taken
 from shift_learner.learners.planning.engine import Model, State, decided, model_of, rewarded, start, values_everywhere
-from shift_learner.learners.planning.plausible import Floats, Ints
+from shift_learner.learners.planning.plausible import Ints
 
 Event = tuple[int, ...]
 """(triple, action) is a decision; (triple, action, success) its result."""
@@ -45,9 +45,10 @@ class Memory:
     history: tuple[Event, ...] = ()
 
     @cached_property
-    def values(self) -> Floats:
+    def values(self) -> list[list[float]]:
         """The value of each action at each triple, planned when it is first asked for."""
-        return values_everywhere(self.model, self.state)
+        values: list[list[float]] = values_everywhere(self.model, self.state).tolist()
+        return values
 
 
 class Planner:
@@ -78,9 +79,9 @@ class Planner:
     def row(self, context: Context, memory: Memory, state: int) -> Row:
         """All probability on the best action, the first of equals."""
         memory = _under(context, memory)
-        values = memory.values[state].tolist()
+        values = memory.values[state]
         best = values.index(max(values))
-        return Row([float(a == best) for a in range(len(values))], values, memory.visits[state].tolist())
+        return Row([float(a == best) for a in range(len(values))], list(values), memory.visits[state].tolist())
 
     def epsilon(self, context: Context, memory: Memory) -> None:
         """It does not explore at random."""

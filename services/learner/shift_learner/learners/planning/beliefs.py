@@ -17,6 +17,7 @@ Warmuth 1998), which is exact for somebody who is replaced by another with that 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from shift_schemas.study import LearnerSettings
@@ -34,17 +35,6 @@ COUNT_MEMORY = 0.98
 
 
 @dataclass(frozen=True)
-class Beliefs:
-    """Posterior weights, [runs, ...] each."""
-
-    columns: tuple[Floats, ...]
-    preferences: Floats
-    successes: Floats
-    failures: Floats
-    experts: Floats
-
-
-@dataclass(frozen=True)
 class Priors:
     """Where beliefs start, and what they give back to."""
 
@@ -52,6 +42,40 @@ class Priors:
     columns: tuple[Floats, ...]
     experts: Floats
     change: float
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """Posterior weights, [runs, ...] each."""
+
+    prior: Priors
+    columns: tuple[Floats, ...]
+    preferences: Floats
+    successes: Floats
+    failures: Floats
+    experts: Floats
+
+    @cached_property
+    def chances(self) -> Floats:
+        """Probability of success, [runs, 30, actions]."""
+        people = self.prior.plausible
+        suits: Floats = np.ones(())
+        for s, (weights, column) in enumerate(zip(self.columns, people.columns, strict=True)):
+            by_level = (weights @ column.suits).reshape(len(weights), -1, column.levels)
+            suits = suits * by_level[:, :, people.levels[:, s]]
+        preferred = (self.preferences @ people.preferences.success).reshape(np.shape(suits))
+        counted = _counted_chances(self.successes, self.failures).reshape(np.shape(suits))
+        first, second, third = (self.experts[:, i, None, None] for i in range(3))
+        mixed: Floats = first * _noisy(suits) + second * _noisy(preferred) + third * counted
+        return mixed
+
+    def of(self, runs: slice) -> Beliefs:
+        """Some of the runs; all of them are the same beliefs."""
+        if runs.start == 0 and runs.stop >= len(self.experts):
+            return self
+        columns = tuple(column[runs] for column in self.columns)
+        rest = (self.preferences[runs], self.successes[runs], self.failures[runs], self.experts[runs])
+        return Beliefs(self.prior, columns, *rest)
 
 
 def priors(plausible: Plausible, settings: LearnerSettings) -> Priors:
@@ -69,6 +93,7 @@ def started(prior: Priors, runs: int) -> Beliefs:
     """Before the first result."""
     counts = np.zeros((runs, prior.plausible.preferences.success.shape[1]))
     return Beliefs(
+        prior,
         tuple(np.repeat(column[None], runs, axis=0) for column in prior.columns),
         np.repeat(prior.plausible.preferences.prior[None], runs, axis=0),
         counts,
@@ -77,22 +102,9 @@ def started(prior: Priors, runs: int) -> Beliefs:
     )
 
 
-def chances(beliefs: Beliefs, prior: Priors) -> Floats:
-    """Probability of success, [runs, 30, actions]."""
-    people = prior.plausible
-    suits: Floats = np.ones(())
-    for s, (weights, column) in enumerate(zip(beliefs.columns, people.columns, strict=True)):
-        by_level = (weights @ column.suits).reshape(len(weights), -1, column.levels)
-        suits = suits * by_level[:, :, people.levels[:, s]]
-    preferred = (beliefs.preferences @ people.preferences.success).reshape(np.shape(suits))
-    counted = _counted_chances(beliefs.successes, beliefs.failures).reshape(np.shape(suits))
-    first, second, third = (beliefs.experts[:, i, None, None] for i in range(3))
-    mixed: Floats = first * _noisy(suits) + second * _noisy(preferred) + third * counted
-    return mixed
-
-
-def told(beliefs: Beliefs, prior: Priors, triple: Ints, action: Ints, success: Bools) -> Beliefs:
+def told(beliefs: Beliefs, triple: Ints, action: Ints, success: Bools) -> Beliefs:
     """After a result in each run: [runs] each."""
+    prior = beliefs.prior
     people = prior.plausible
     runs, cell = np.arange(len(triple)), triple * len(people.levels) + action
     suited = [c.suits_by_level[triple * c.levels + people.levels[action, s]] for s, c in enumerate(people.columns)]
@@ -108,6 +120,7 @@ def told(beliefs: Beliefs, prior: Priors, triple: Ints, action: Ints, success: B
     )
     experts = beliefs.experts * np.where(success[:, None], predicted, 1 - predicted)
     return Beliefs(
+        prior,
         tuple(
             _shared(w * _column_likelihood(s, fit, i, success), prior.columns[i], prior.change)
             for i, (w, s) in enumerate(zip(beliefs.columns, suited, strict=True))

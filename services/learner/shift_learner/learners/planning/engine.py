@@ -13,7 +13,7 @@ import numpy as np
 from shift_schemas.words import GAZES
 
 from shift_learner.learner import Context
-from shift_learner.learners.planning.beliefs import Beliefs, Priors, chances, priors, started, told
+from shift_learner.learners.planning.beliefs import Beliefs, Priors, priors, started, told
 from shift_learner.learners.planning.lookahead import Battery, action_values, ahead, battery_of, level_of
 from shift_learner.learners.planning.plausible import Bools, Floats, Ints, plausible_people
 
@@ -93,7 +93,7 @@ def _executed(model: Model, capacity: Floats, previous: Ints, action: Ints) -> F
 def rewarded(model: Model, state: State, triple: Ints, action: Ints, success: Bools) -> State:
     """A result in each run; a reward above 0 is a success."""
     share = state.share + LATELY * (success - state.share)
-    return replace(state, beliefs=told(state.beliefs, model.prior, triple, action, success), share=share)
+    return replace(state, beliefs=told(state.beliefs, triple, action, success), share=share)
 
 
 def values_at(model: Model, state: State, triple: Ints) -> Floats:
@@ -130,11 +130,7 @@ def values_everywhere(model: Model, state: State) -> Floats:
 def _ahead(model: Model, state: State, runs: slice) -> tuple[Floats, Floats]:
     """Chances of success [actions, 2, 3, 5, runs], and what lies ahead of each outcome."""
     study = model.context.study
-    b = state.beliefs
-    part = Beliefs(
-        tuple(c[runs] for c in b.columns), b.preferences[runs], b.successes[runs], b.failures[runs], b.experts[runs]
-    )
-    found = chances(part, model.prior)
+    found = state.beliefs.of(runs).chances
     chance = np.ascontiguousarray(found.transpose(2, 1, 0)).reshape(found.shape[2], 2, 3, 5, -1)
     turns = state.turns[:, :, runs]
     turns = turns / turns.sum(axis=1, keepdims=True)
