@@ -49,6 +49,8 @@ class Open:
     task: str
     taken: Taken
     versions: Versions
+    following: Taken | None = None
+    """The decision after it, once there is one."""
 
 
 @dataclass(frozen=True)
@@ -139,16 +141,17 @@ def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[Learne
         propensity=decision.propensity,
     )
     previous = next((i for i, o in state.open.items() if i in state.rewards and o.taken == state.last), None)
+    opened = {i: replace(o, following=taken) if o.taken == state.last else o for i, o in state.open.items()}
     after = replace(
         state,
         memory=learner.decided(context, state.memory, taken),
-        open={**state.open, decision.decision_id: Open(decision.task, taken, decision.versions)},
+        open={**opened, decision.decision_id: Open(decision.task, taken, decision.versions)},
         last=taken,
         decisions=decision.n,
     )
     facts: tuple[Fact, ...] = ()
     if previous is not None:
-        after, transition = _updated(after, previous, taken, now)
+        after, transition = _updated(after, previous, now)
         facts = (transition,)
     return _with_policy(after, facts, now)
 
@@ -168,10 +171,9 @@ def _reported(state: LearnerState, command: ReportPerformance, now: Stamp, late:
         rewards={**state.rewards, command.command_id: performance.reward},
     )
     facts: tuple[Fact, ...] = (performance,)
-    waits = _learner(state).needs_following(_context(state)) and known.taken == state.last
+    waits = _learner(state).needs_following(_context(state)) and known.following is None
     if not waits:
-        following = next((o.taken for o in state.open.values() if o.taken.n == known.taken.n + 1), state.last)
-        after, transition = _updated(after, command.command_id, following, now)
+        after, transition = _updated(after, command.command_id, now)
         facts = (performance, transition)
     done = _with_policy(after, facts, now)
     return replace(done, result=performance.model_dump(mode="json"))
@@ -183,7 +185,7 @@ def _ended(state: LearnerState, now: Stamp) -> Step[LearnerState]:
         return Step(state)
     facts: list[Fact] = []
     for decision_id in list(state.rewards):
-        state, transition = _updated(state, decision_id, None, now)
+        state, transition = _updated(state, decision_id, now)
         facts.append(transition)
     return _with_policy(state, tuple(facts), now)
 
@@ -220,15 +222,11 @@ def _performance(state: LearnerState, command: ReportPerformance, now: Stamp) ->
     )  # fmt: skip
 
 
-def _updated(
-    state: LearnerState, decision_id: str, following: Taken | None, now: Stamp
-) -> tuple[LearnerState, Transition]:
-    """Learn from a reported decision. ``following`` may be the decision itself: then nothing follows."""
+def _updated(state: LearnerState, decision_id: str, now: Stamp) -> tuple[LearnerState, Transition]:
+    """Learn from a reported decision, with the one that followed it where there is one."""
     context, learner = _context(state), _learner(state)
     known, gained = state.open[decision_id], state.rewards[decision_id]
-    if following is not None and following.n <= known.taken.n:
-        following = None
-    memory = learner.rewarded(context, state.memory, known.taken, gained, following)
+    memory = learner.rewarded(context, state.memory, known.taken, gained, known.following)
     row = state_of(learner, known.taken)
     transition = Transition(
         session=state.session, stamp=now, seen=_seen(state), decision_id=decision_id, task=known.task,

@@ -1,0 +1,382 @@
+"""The learner's core as a fold over a session: against a naive loop, and across restarts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import exp
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shift_learner import core
+from shift_learner.core import LearnerState
+from shift_learner.learners import learner_named
+from shift_schemas.errors import Conflict, InvalidStudy, ShiftError, Unavailable, UnknownThing
+from shift_schemas.messages import (
+    Config,
+    Decision,
+    Fact,
+    Performance,
+    Policy,
+    ReportPerformance,
+    Result,
+    Seen,
+    Session,
+    Transition,
+    Versions,
+)
+from shift_schemas.scoring import reduce, view
+from shift_schemas.stamps import Stamp
+from shift_schemas.step import NotYet
+from shift_schemas.study import Study
+from shift_schemas.study_text import study_json, study_of
+from shift_schemas.words import TRIPLES, Triple
+
+NOW = Stamp(sec=1_700_000_000, nsec=0)
+FOCUSED = Triple("high", "focused", "unknown")
+ACTIONS = Study(study="x").scoring.actions
+
+
+def session(state: Any = "live") -> Session:
+    """The session's fact in one of its states."""
+    return Session(session="s1", stamp=NOW, participant="P01", study="x", seed=7, state=state, started=NOW)
+
+
+def config(version: int = 1, **learner: Any) -> Config:
+    """A configuration with these settings of the learner."""
+    return Config(
+        session="s1", stamp=NOW, version=version, study=study_json(study_of({"study": "x", "learner": learner}))
+    )
+
+
+def decision(n: int, action: int = 0, triple: Triple = FOCUSED, overridden: bool = False) -> Decision:
+    """The ``n``-th decision."""
+    scoring = Study(study="x").scoring
+    found = reduce(scoring, triple)
+    return Decision(
+        session="s1", stamp=NOW, decision_id=f"d{n}", task="grasp", n=n, strategy=scoring.strategy(ACTIONS[action]),
+        observation=view(triple), scores=found.scores, cognitive_state=found.cognitive_state,
+        suggested=scoring.strategy(ACTIONS[found.action]), actions=[scoring.strategy(a) for a in ACTIONS],
+        probabilities=[1 / 6] * 6, propensity=None if overridden else 1 / 6, explored=False,
+        policy_source="override" if overridden else "learner", stale=False, state=found.cognitive_state, seed=7,
+        versions=Versions(observation=n, policy=n, config=1),
+    )  # fmt: skip
+
+
+def report(n: int, understood: bool = True, able: bool = True, seconds: float = 5.0, **need: int) -> ReportPerformance:
+    """How the task of the ``n``-th decision went."""
+    return ReportPerformance(
+        command_id=f"d{n}", session="s1", need=Seen(**need),
+        comprehension=Result(success=understood, duration_s=seconds),
+        enabledness=Result(success=able, duration_s=seconds),
+    )  # fmt: skip
+
+
+def folded(*messages: Any) -> tuple[LearnerState, list[Fact]]:
+    """The state and all the facts after these messages."""
+    state: LearnerState | None = None
+    facts: list[Fact] = []
+    for message in messages:
+        step = core.step(state, message, NOW)
+        state = step.state
+        facts += step.facts
+    assert state is not None
+    return state, facts
+
+
+def begun(**learner: Any) -> LearnerState:
+    """A session that has its configuration."""
+    return folded(session(), config(**learner))[0]
+
+
+def of_kind(facts: Any, kind: Any) -> Any:
+    """The only fact of that kind."""
+    (found,) = [f for f in facts if isinstance(f, kind)]
+    return found
+
+
+# --- a policy after each input, for one decision number ---
+
+
+def test_the_first_policy_comes_with_the_configuration_and_is_for_decision_1() -> None:
+    _, facts = folded(session(), config())
+    policy = of_kind(facts, Policy)
+    assert (policy.version, policy.for_n, policy.epsilon, policy.cumulative_reward) == (1, 1, 0.75, 0.0)
+    assert policy.seen == Seen(config=1)
+    assert list(policy.states) == list(Study(study="x").scoring.states)
+    assert policy.states["engaged_observer"].probabilities == [0.75 / 6 + 0.25, *[0.75 / 6] * 5]
+    assert [tuple(a.values()) for a in policy.actions] == list(ACTIONS)
+
+
+def test_each_decision_and_each_report_is_followed_by_a_policy_that_says_what_it_had_seen() -> None:
+    state = begun()
+    for message, for_n, seen in (
+        (decision(1), 2, Seen(decision=1, config=1)),
+        (report(1), 2, Seen(decision=1, performance=1, config=1)),
+        (decision(2), 3, Seen(decision=2, performance=1, config=1)),
+        (config(2, epsilon=0.5), 3, Seen(decision=2, performance=1, config=2)),
+    ):
+        step = core.step(state, message, NOW)
+        policy = of_kind(step.facts, Policy)
+        assert (policy.for_n, policy.seen, policy.version) == (for_n, seen, state.version + 1)
+        assert step.facts[-1] is policy
+        state = step.state
+    assert policy.epsilon == 0.5 * 0.98
+
+
+def test_a_report_gives_performance_transition_and_policy() -> None:
+    state, _ = folded(session(), config(), decision(1, action=2))
+    step = core.step(state, report(1, understood=True, able=False, seconds=5.0), NOW)
+    performance, transition, policy = step.facts
+    assert isinstance(performance, Performance)
+    assert isinstance(transition, Transition)
+    assert isinstance(policy, Policy)
+    assert performance.comprehension.value == exp(-0.5) == -performance.enabledness.value
+    assert (performance.n, performance.task, performance.reward, performance.cumulative_reward) == (
+        1,
+        "grasp",
+        0.0,
+        0.0,
+    )
+    assert step.result == performance.model_dump(mode="json")
+    assert transition.state == "engaged_observer"
+    assert tuple(transition.action.values()) == ACTIONS[2]
+    assert (transition.reward, transition.propensity, transition.versions) == (0.0, 1 / 6, decision(1).versions)
+    assert transition.value == policy.states["engaged_observer"].values[2]
+
+
+def test_rewards_add_up() -> None:
+    state, _ = folded(session(), config(), decision(1), report(1, seconds=0.0), decision(2))
+    step = core.step(state, report(2, understood=False, able=False, seconds=0.0), NOW)
+    performance = of_kind(step.facts, Performance)
+    assert (performance.n, performance.reward, performance.cumulative_reward) == (2, -1.0, 0.0)
+    assert of_kind(step.facts, Policy).cumulative_reward == 0.0
+
+
+def test_an_override_counts_as_taken_is_learned_from_and_has_no_propensity() -> None:
+    state, facts = folded(session(), config(), decision(1, action=3, overridden=True))
+    assert facts[-1].states["unfocused"].probabilities[3] == pytest.approx(1 - 0.75 * 0.99), "greedy only: it is taken"  # type: ignore[attr-defined]
+    step = core.step(state, report(1, seconds=0.0), NOW)
+    transition = of_kind(step.facts, Transition)
+    assert transition.propensity is None
+    assert transition.value == 0.25
+    assert of_kind(step.facts, Policy).states["engaged_observer"].visits == [0, 0, 0, 1, 0, 0]
+
+
+# --- what cannot be carried out ---
+
+
+def test_without_its_decision_a_report_waits_for_the_decider_and_then_is_unknown() -> None:
+    with pytest.raises(NotYet) as waiting:
+        core.step(begun(), report(1), NOW)
+    assert waiting.value.owners == ("decider",)
+    with pytest.raises(UnknownThing, match="no decision d1"):
+        core.step(begun(), report(1), NOW, late=True)
+
+
+def test_while_the_learner_cannot_know_it_is_unavailable_and_never_unknown() -> None:
+    with pytest.raises(NotYet):
+        core.step(begun(), report(1, decision=1), NOW)
+    with pytest.raises(Unavailable, match="decider"):
+        core.step(begun(), report(1, decision=1), NOW, late=True)
+    bare, _ = folded(session())
+    with pytest.raises(NotYet) as waiting:
+        core.step(bare, report(1), NOW)
+    assert waiting.value.owners == ("recorder", "decider")
+    with pytest.raises(Unavailable, match="recorder"):
+        core.step(bare, report(1), NOW, late=True)
+
+
+def test_a_report_waits_for_the_configuration_that_was_answered_before_it() -> None:
+    state, _ = folded(session(), config(), decision(1))
+    with pytest.raises(NotYet) as waiting:
+        core.step(state, report(1, config=2), NOW)
+    assert waiting.value.owners == ("recorder",)
+    assert core.step(state, report(1, config=2), NOW, late=True).facts
+
+
+def test_nothing_is_taken_without_a_session_or_after_its_end() -> None:
+    with pytest.raises(UnknownThing):
+        core.step(None, report(1), NOW)
+    state, _ = folded(session(), config(), decision(1), session("ending"))
+    with pytest.raises(Conflict, match="has ended"):
+        core.step(state, report(1), NOW)
+
+
+def test_a_decision_is_reported_once() -> None:
+    state, _ = folded(session(), config(), decision(1), report(1))
+    with pytest.raises(UnknownThing):
+        core.step(state, report(1), NOW, late=True)
+    waiting, _ = folded(session(), config(discount=0.5), decision(1), report(1))
+    with pytest.raises(Conflict, match="has its performance already"):
+        core.step(waiting, report(1), NOW)
+
+
+def test_a_decision_before_the_configuration_is_read_again_later() -> None:
+    bare, _ = folded(session())
+    with pytest.raises(Unavailable):
+        core.step(bare, decision(1), NOW)
+
+
+def test_an_unknown_learner_is_refused_with_those_that_there_are() -> None:
+    with pytest.raises(InvalidStudy, match="there is no learner 'deep' yet; write one of "):
+        learner_named("deep")
+
+
+# --- a discount above 0 ---
+
+
+def test_with_a_discount_the_transition_waits_for_the_next_decision() -> None:
+    state, _ = folded(session(), config(discount=0.5), decision(1, action=0))
+    step = core.step(state, report(1, seconds=0.0), NOW)
+    assert [type(f) for f in step.facts] == [Performance, Policy]
+    assert of_kind(step.facts, Policy).states["engaged_observer"].values[0] == 1.0, "nothing learned yet"
+    after = core.step(step.state, decision(2, triple=Triple("low", "distracted", "failure")), NOW)
+    assert [type(f) for f in after.facts] == [Transition, Policy]
+    assert of_kind(after.facts, Transition).decision_id == "d1"
+    assert of_kind(after.facts, Transition).value == 1.0 + 0.25 * (1.0 + 0.5 * 1.0 - 1.0)
+
+
+def test_what_waits_at_the_session_s_end_is_learned_without_a_next_one() -> None:
+    state, _ = folded(session(), config(discount=0.5), decision(1, action=1), report(1, seconds=0.0))
+    step = core.step(state, session("ending"), NOW)
+    assert [type(f) for f in step.facts] == [Transition, Policy]
+    assert of_kind(step.facts, Transition).value == 0.25
+    assert core.step(step.state, session("ended"), NOW).facts == ()
+
+
+def test_without_anything_waiting_the_end_puts_nothing_out() -> None:
+    state, _ = folded(session(), config(), decision(1), report(1))
+    assert core.step(state, session("ending"), NOW).facts == ()
+
+
+def test_the_state_that_followed_is_remembered_though_its_own_result_came_first() -> None:
+    low = Triple("low", "distracted", "failure")
+    messages = (session(), config(discount=0.5), decision(1), decision(2, action=1, triple=low), decision(3))
+    state, _ = folded(*messages, report(2, understood=False, able=False, seconds=0.0))
+    values = core.step(state, report(1, seconds=0.0), NOW)
+    following = of_kind(core.step(state, decision(4), NOW).facts, Policy).states["overwhelmed_struggler"].values
+    assert following[1] < 1.0, "d2 was a failure"
+    assert of_kind(values.facts, Transition).value == 1.0 + 0.25 * (1.0 + 0.5 * max(following) - 1.0)
+
+
+# --- against a naive loop, and across restarts ---
+
+
+@dataclass
+class Naive:
+    """The same session, by hand."""
+
+    rate: float
+    discount: float
+    table: list[list[float]]
+    states: list[int] = field(default_factory=list)
+    actions: list[int] = field(default_factory=list)
+    waiting: dict[int, float] = field(default_factory=dict)
+
+    def decide(self, state: int, action: int) -> None:
+        self.states.append(state)
+        self.actions.append(action)
+        last = len(self.states) - 1
+        if last in self.waiting:
+            self.learn(last, self.waiting.pop(last))
+
+    def report(self, n: int, reward: float) -> None:
+        if self.discount > 0 and n == len(self.states):
+            self.waiting[n] = reward
+        else:
+            self.learn(n, reward)
+
+    def end(self) -> None:
+        for n, reward in self.waiting.items():
+            self.learn(n, reward)
+
+    def learn(self, n: int, reward: float) -> None:
+        s, a = self.states[n - 1], self.actions[n - 1]
+        target = reward + (self.discount * max(self.table[self.states[n]]) if n < len(self.states) else 0.0)
+        self.table[s][a] += self.rate * (target - self.table[s][a])
+
+
+decides = st.tuples(st.sampled_from(TRIPLES), st.integers(0, 5), st.booleans())
+reports = st.tuples(st.integers(0, 30), st.booleans(), st.booleans(), st.floats(0, 20))
+histories = st.lists(decides | reports, max_size=30)
+
+
+def messages_of(history: list[Any]) -> list[Any]:
+    """Decisions, and reports of decisions that are still open."""
+    messages: list[Any] = []
+    open_ones: list[int] = []
+    n = 0
+    for entry in history:
+        if len(entry) == 3:
+            n += 1
+            messages.append(decision(n, entry[1], entry[0], entry[2]))
+            open_ones.append(n)
+        elif open_ones:
+            which = open_ones.pop(entry[0] % len(open_ones))
+            messages.append(report(which, *entry[1:]))
+    return messages
+
+
+@settings(deadline=None, max_examples=60)
+@given(histories, st.sampled_from([0.0, 0.5, 1.0]), st.floats(0, 1), st.booleans())
+def test_the_values_are_those_of_a_naive_loop(history: list[Any], discount: float, rate: float, prior: bool) -> None:
+    naive = Naive(rate, discount, [[float(prior and a == s) for a in range(6)] for s in range(6)])
+    state = begun(discount=discount, learning_rate=rate, scoring_prior=prior)
+    names = Study(study="x").scoring.states
+    decided, taken = 0, set()
+    for message in [*messages_of(history), session("ending")]:
+        step = core.step(state, message, NOW)
+        state = step.state
+        if isinstance(message, Decision):
+            action = message.actions.index(message.strategy)
+            naive.decide(names.index(message.cognitive_state), action)
+            decided += 1
+            taken.add(action)
+        elif isinstance(message, ReportPerformance):
+            naive.report(int(message.command_id[1:]), of_kind(step.facts, Performance).reward)
+        else:
+            naive.end()
+        policies = [f for f in step.facts if isinstance(f, Policy)]
+        for policy in policies:
+            assert [row.values for row in policy.states.values()] == naive.table
+            epsilon = 0.75 * max(0.0, 1 - decided / 100)
+            candidates = [a for a in range(6) if a not in taken] or list(range(6))
+            for row in policy.states.values():
+                greedy = row.values.index(max(row.values))
+                expected = [
+                    epsilon / len(candidates) * (a in candidates) + (1 - epsilon) * (a == greedy) for a in range(6)
+                ]
+                assert row.probabilities == pytest.approx(expected, abs=1e-12)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    histories, st.integers(0, 30), st.sampled_from([0.0, 0.5]), st.sampled_from(["q-learning", "scoring", "thompson"])
+)
+def test_a_restart_at_any_point_changes_nothing(history: list[Any], at: int, discount: float, name: str) -> None:
+    messages = [session(), config(discount=discount, name=name), *messages_of(history), session("ending")]
+    living: LearnerState | None = None
+    restarted: LearnerState | None = None
+    for i, message in enumerate(messages):
+        if i == at % len(messages) and restarted is not None:
+            text = core.dump(restarted)
+            restarted = core.load(text)
+            assert restarted == living
+            assert core.dump(restarted) == text
+        step, again = core.step(living, message, NOW), core.step(restarted, message, NOW)
+        assert step.facts == again.facts
+        assert step.result == again.result
+        living, restarted = step.state, again.state
+
+
+@settings(deadline=None, max_examples=30)
+@given(histories)
+def test_a_refused_command_leaves_the_state_as_it_was(history: list[Any]) -> None:
+    state, _ = folded(session(), config(), *messages_of(history))
+    before = core.dump(state)
+    for late in (False, True):
+        with pytest.raises((ShiftError, NotYet)):
+            core.step(state, report(999), NOW, late=late)
+    assert core.dump(state) == before

@@ -1,0 +1,32 @@
+"""Scoring only: the suggestion, always; it counts and learns nothing."""
+
+import json
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shift_learner.learner import Context, Taken
+from shift_learner.learners.scoring import Scoring
+from shift_schemas.study import Study
+
+LEARNER, KNOWN = Scoring(), Context(Study(study="x"))
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5), st.floats(-1, 1)), max_size=20))
+def test_whatever_the_rewards_it_suggests_what_the_scoring_system_does(history: list[tuple[int, int, float]]) -> None:
+    memory = LEARNER.initial(KNOWN)
+    visits = [[0] * 6 for _ in range(6)]
+    for n, (state, action, reward) in enumerate(history, start=1):
+        taken = Taken(n, 0, state, action, 1.0)
+        memory = LEARNER.rewarded(KNOWN, LEARNER.decided(KNOWN, memory, taken), taken, reward, None)
+        visits[state][action] += 1
+    for state in range(6):
+        row = LEARNER.row(KNOWN, memory, state)
+        assert row.probabilities == row.values == [float(a == state) for a in range(6)]
+        assert row.visits == visits[state]
+    assert LEARNER.load(KNOWN, json.loads(json.dumps(LEARNER.dump(memory)))) == memory
+
+
+def test_it_neither_explores_nor_waits() -> None:
+    assert LEARNER.epsilon(KNOWN, LEARNER.initial(KNOWN)) is None
+    assert not LEARNER.needs_following(KNOWN)
