@@ -43,9 +43,7 @@ class LiveMesh:
     def pid_of(self, package: str) -> int:
         """The process of a service, found by its package in its command line."""
         found = [
-            int(entry.name)
-            for entry in Path("/proc").iterdir()
-            if entry.name.isdigit() and self._is(entry, package)
+            int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and self._is(entry, package)
         ]
         assert len(found) == 1, f"{package}: {found}"
         return found[0]
