@@ -12,8 +12,17 @@ from typing import Annotated
 
 import typer
 from shift_schemas.errors import ShiftError
+from shift_simulator import commands as evaluate_commands
 
-from shift_cli import doctor_command, gaze_command, ros2_command, simulate_command
+from shift_cli import (
+    doctor_command,
+    gaze_command,
+    info_command,
+    replay_command,
+    ros2_command,
+    simulate_command,
+    verify_command,
+)
 
 app = typer.Typer(
     name="shift-mesh",
@@ -58,8 +67,12 @@ def router() -> None:
 
 app.command("doctor")(doctor_command.doctor)
 app.command("simulate")(simulate_command.simulate)
+app.command("verify")(verify_command.verify)
+app.command("info")(info_command.info)
+app.command("replay")(replay_command.replay)
 app.command("ros2", context_settings=ros2_command.CONTEXT)(ros2_command.ros2)
 app.add_typer(gaze_command.app, name="gaze")
+app.add_typer(evaluate_commands.app, name="evaluate")
 
 
 def main() -> None:
