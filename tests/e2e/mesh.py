@@ -8,10 +8,11 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import httpx
 
@@ -74,6 +75,18 @@ class LiveMesh:
             assert self.process.poll() is None, self.log.read_text()
             time.sleep(0.05)
         raise AssertionError(self.log.read_text())
+
+    def ready(self) -> dict[str, Any]:
+        """What ``/readyz`` says."""
+        found: dict[str, Any] = httpx.get(f"{self.url}/readyz", timeout=10.0).json()
+        return found
+
+    def until(self, there: Callable[[], object]) -> None:
+        """Wait until ``there()``."""
+        end = time.monotonic() + READY_WITHIN_S
+        while not there():
+            assert time.monotonic() < end, self.log.read_text()[-8000:]
+            time.sleep(0.02)
 
     def stop(self, number: signal.Signals = signal.SIGTERM) -> int:
         """Stop it; the exit code."""

@@ -15,7 +15,8 @@ from shift_runtime import reader as reader_module
 from shift_runtime import worker as worker_module
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import Conflict, MalformedMessage, ShiftError, Unavailable, UnknownThing
-from shift_schemas.messages import Decide, Decision, OutboxPage, OutboxQuery, Seen
+from shift_schemas.messages import Decide, Decision, Gaze, Marker, OutboxPage, OutboxQuery, Seen
+from shift_schemas.stamps import Stamp
 from worker_rig import CORE, Notes, Rig, config, dump, fixation, load, session
 
 RUNNING = pytest.mark.anyio
@@ -209,6 +210,20 @@ async def test_facts_that_come_before_the_configuration_are_held_back_too(live: 
     live.recorder.put_out(config("s2"), hint=False)
     await until(lambda: len(live.outbox("s2")) == 2)
     assert live.outbox("s2") == [(1, "fixation 1"), (2, "fixation 2")]
+
+
+@RUNNING
+async def test_a_stranger_s_fact_of_a_session_to_come_takes_no_place_in_it(live: Rig) -> None:
+    """Well-formed, and of a subject that this service only passes over: sequence 1 is still to come."""
+    forged = Marker(session="s2", stamp=Stamp.of(1), marker_id="m", text="")
+    gaze = Gaze(session="s2", stamp=Stamp.of(1), source="eyes", seq=0, t=[0.0], aoi=[""])
+    live.bus.put("shift/v1/s2/marker", forged.model_dump_json().encode(), attachment=b"1")
+    live.bus.put("shift/v1/s2/gaze", gaze.model_dump_json().encode(), attachment=b"1")
+    await asyncio.sleep(0.02)
+    live.recorder.put_out(session("s2"), config("s2"))
+    live.monitor.put_out(fixation(1, "s2"))
+    await until(lambda: live.outbox("s2"))
+    assert live.outbox("s2") == [(1, "fixation 1")]
 
 
 @RUNNING

@@ -302,14 +302,18 @@ class Worker(Generic[S]):
         session = read.fact.session
         if read.seq != self.processed.get((session, read.owner), 0) + 1:
             return  # a commit failed meanwhile: this one is read again in its turn
+        state = self._state(session)
         if read.fact.subject in self.core.reads[read.owner]:
             try:
-                step = self.core.step(self._state(session), read.fact, self.clock.now())
+                step = self.core.step(state, read.fact, self.clock.now())
             except (NotYet, UnknownThing, Unavailable):
                 self._hold_back(session, read)
                 return
             self._take(turn, session, step)
             self.metrics.read(read.fact.subject)
+        elif state is None:
+            self._hold_back(session, read)
+            return
         self.processed[session, read.owner] = read.seq
         turn.batch.cursors[session, read.owner] = read.seq
         if isinstance(read.fact, Session) and read.fact.state == "ended":
