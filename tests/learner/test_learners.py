@@ -133,7 +133,7 @@ def test_a_finer_grid_changes_beta_chances_by_less_than_it_says(monkeypatch: pyt
 
 
 def test_normal_chances_are_how_often_sampling_would_choose() -> None:
-    means, deviations = np.array([0.0, 0.1, 0.4, -1.0]), np.array([1.0, 0.2, 0.05, 2.0])
+    means, deviations = (0.0, 0.1, 0.4, -1.0), (1.0, 0.2, 0.05, 2.0)
     samples = np.random.default_rng(1).normal(means, deviations, (400_000, 4))
     frequencies = np.bincount(samples.argmax(axis=1), minlength=4) / len(samples)
     assert linear_thompson.chances(means, deviations) == pytest.approx(frequencies.tolist(), abs=0.004)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -9,9 +11,10 @@ import pytest
 
 gymnasium = pytest.importorskip("gymnasium", reason="an optional extra")
 
+import shift_simulator.env  # noqa: E402, F401
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 from shift_schemas.study import Study  # noqa: E402
-from shift_simulator.env import ENV_ID  # noqa: E402
+from shift_simulator import ENV_ID  # noqa: E402
 from shift_simulator.optimum import optimum  # noqa: E402
 from shift_simulator.users import paper_user  # noqa: E402
 
@@ -35,6 +38,12 @@ def test_following_the_suggestion_is_nearly_optimal_with_user_a() -> None:
             total += reward
         totals.append(total)
     assert np.mean(totals) == pytest.approx(optimum(paper_user("A"), Study(study="s"), 100), abs=1.5)
+
+
+def test_importing_gymnasium_and_then_the_package_is_enough() -> None:
+    program = "import gymnasium, shift_simulator; gymnasium.make('shift/Partner-v0', user='B').reset(seed=1)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_one_seed_is_one_session() -> None:

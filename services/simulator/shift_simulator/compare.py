@@ -48,7 +48,7 @@ def rewards_of(name: str, user: User, seed: int, runs: int, episodes: int = EPIS
 
 
 def _summary(cumulative: Floats, best: float | None) -> dict[str, Any]:
-    reward, dip = cumulative[-1], np.minimum(cumulative.min(axis=0), 0.0)
+    reward, dip = cumulative[-1], cumulative.min(axis=0)
     return {
         "reward_mean": float(reward.mean()),
         "reward_se": _error(reward),

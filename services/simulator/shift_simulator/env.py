@@ -1,7 +1,8 @@
 """The simulated partner as a Gymnasium environment: ``gymnasium.make("shift/Partner-v0", user="B")``.
 
-For agents from outside. Gymnasium is an optional extra. Importing this module registers the environment;
-``gymnasium.make("shift_simulator.env:shift/Partner-v0")`` does both at once.
+For agents from outside. Gymnasium is an optional extra. Importing this module registers the environment, as does
+``import shift_simulator`` after ``import gymnasium``; ``gymnasium.make("shift_simulator.env:shift/Partner-v0")`` does
+both at once.
 """
 
 from __future__ import annotations
@@ -16,11 +17,10 @@ from shift_schemas.scoring import suggestions
 from shift_schemas.study import Study
 from shift_schemas.words import TRIPLES
 
+from shift_simulator import ENV_ID
 from shift_simulator.draws import drawn
 from shift_simulator.dynamics import Partners
 from shift_simulator.users import ACTIONS, PAPER_USERS, User, paper_user, parse_user
-
-ENV_ID = "shift/Partner-v0"
 
 
 class PartnerEnv(gymnasium.Env[np.int64, np.int64]):
