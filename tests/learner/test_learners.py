@@ -201,3 +201,43 @@ def test_a_learner_of_twenty_lines_runs_in_the_cores_and_in_simulation(monkeypat
     assert all(e.decision.policy_source == "learner" for e in played)
     simulated = rewards_of("ucb1", paper_user("A"), 2, 1, episodes=40)
     assert [e.performance.cumulative_reward for e in played] == simulated[:, 0].tolist()
+
+
+# --- studies at their edges ---
+
+SIX = {f"s{i}": {"levels": ["off", "on"], "thresholds": [0.5]} for i in range(6)}
+ROWS = {
+    "capacity": ("low", "high"),
+    "gaze": ("distracted", "uncertain", "focused"),
+    "awareness": ("unknown", "failure", "misconception_enabledness", "misconception_comprehension", "success"),
+}
+TABLE = {part: {row: dict.fromkeys(SIX, 0.5) for row in rows} for part, rows in ROWS.items()}
+EDGES: list[dict[str, Any]] = [
+    {"capacity": {"start": 0, "max": 0}},
+    {"capacity": {"threshold": 0}},
+    {"capacity": {"threshold": 5}},
+    {"capacity": {"recovery": 0.07, "demanding_cost": 0.013}},
+    {"capacity": {"start": 1e6, "max": 1e6}},
+    {
+        "scoring": {"strategies": {**SIX, "negation": None, "hesitation": None}, "table": TABLE},
+        "capacity": {"demanding": ["on"]},
+    },
+    {"scoring": {"strategies": {"negation": None}}, "capacity": {"demanding": []}},
+    {"reward": {"scale": 0}},
+    {"interactions": 1},
+    {"learner": {"planning_horizon": 0, "planning_discount": 1, "scoring_prior": False, "prior_strength": 0}},
+    {"learner": {"change_probability": 0, "exploration": 0, "epsilon": 0}},
+]
+
+
+@pytest.mark.parametrize("edge", EDGES, ids=lambda edge: str(edge)[:40])
+@pytest.mark.parametrize("name", NAMES)
+def test_rows_stay_distributions_at_the_edges_of_what_a_study_can_say(name: str, edge: dict[str, Any]) -> None:
+    settings = {"name": name} | edge.get("learner", {})
+    where = Context(Study.model_validate({"study": "s"} | edge | {"learner": settings}))
+    learner = LEARNERS[name]
+    memory, _ = lived(learner, where, 4)
+    for row in all_rows(learner, where, memory):
+        assert sum(row.probabilities) == pytest.approx(1.0)
+        assert min(row.probabilities) >= 0
+        json.dumps(row.values, allow_nan=False)
