@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import httpx
@@ -71,6 +72,19 @@ def test_a_service_that_dies_is_started_again_and_it_is_said(tmp_path: Path) -> 
         mesh.until(lambda: "the monitor was ended by SIGKILL; it starts again" in mesh.log.read_text())
         mesh.until(lambda: mesh.ready()["ready"])
         assert mesh.pid_of("shift_monitor") != killed
+
+
+def test_a_mesh_that_was_suspended_goes_on(tmp_path: Path) -> None:
+    """Ctrl-Z and fg, or a container that was paused."""
+    with running_mesh(tmp_path) as mesh:
+        for pause_s in (0.05, 0.3):
+            mesh.process.send_signal(signal.SIGSTOP)
+            time.sleep(pause_s)
+            mesh.process.send_signal(signal.SIGCONT)
+            time.sleep(0.2)
+        assert mesh.process.poll() is None
+        assert mesh.ready()["ready"]
+        assert mesh.stop(signal.SIGINT) == 0
 
 
 def test_with_the_supervisor_its_services_go_and_leave_whole_recordings(tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ from dataclasses import dataclass, field
 import setproctitle
 
 _PR_SET_PDEATHSIG = 1
-_SIGNALS = {signal.SIGINT, signal.SIGTERM, signal.SIGCHLD}
+_STOPS = {signal.SIGINT, signal.SIGTERM}
+_SIGNALS = {*_STOPS, signal.SIGCHLD}
 POLL_S = 0.1
 GRACE_S = 12.0
 """How long a service may take to stop; the recorder finishes files in it."""
@@ -86,7 +87,8 @@ class Supervisor:
     def _watch(self) -> int:
         while True:
             received = signal.sigtimedwait(_SIGNALS, POLL_S)
-            if received is not None and received.si_signo != signal.SIGCHLD:
+            # After Ctrl-Z and fg it gives back a number that is no signal: CPython's loop around EINTR.
+            if received is not None and received.si_signo in _STOPS:
                 self.tell(f"{signal.Signals(received.si_signo).name}: stopping")
                 return 0
             for program, status in self._dead():
