@@ -12,6 +12,7 @@ from array import array
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -99,9 +100,9 @@ class _Owner:
     facts: list[Placed] = field(default_factory=list)
     """Kept for every owner but the monitor."""
 
-    @property
+    @cached_property
     def unbroken(self) -> int:
-        """How many come in order from 1 on."""
+        """How many come in order from 1 on; asked for when all have been read."""
         return next((i for i, n in enumerate(self.sequence) if n != i + 1), len(self.sequence))
 
 
@@ -212,8 +213,9 @@ class _Verification:
         if self._begins("decider"):
             fold = Redecide(inputs, self._unbroken("decider"), self._following("decider"))
             decider = self._guarded("decider", fold)
+        unbroken = self.owners["monitor"].unbroken
         for i, placed in enumerate(self._monitored()):
-            monitor.take(placed) if i < self.owners["monitor"].unbroken else monitor.gap(placed)
+            monitor.take(placed) if i < unbroken else monitor.gap(placed)
             if decider is not None and isinstance(placed.fact, Observation):
                 decider.take(placed.fact)
         monitor.end()
