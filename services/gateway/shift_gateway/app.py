@@ -16,7 +16,7 @@ from shift_runtime.clock import Clock
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
 from shift_schemas.codec import encode
-from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, UnknownThing
+from shift_schemas.errors import ShiftError, UnknownThing
 from shift_schemas.keys import OWNERS, ServiceKey, build_key
 from shift_schemas.messages import Fact, GazeChunk, Health
 from starlette.exceptions import HTTPException
@@ -25,7 +25,16 @@ from shift_gateway import bodies
 from shift_gateway.door import Door
 from shift_gateway.gathering import gathered
 from shift_gateway.page import PAGE
-from shift_gateway.problems import BodyLimit, body, check_id, json_body, message, problem_body, problem_response
+from shift_gateway.problems import (
+    PROBLEM_RESPONSE,
+    BodyLimit,
+    body,
+    check_id,
+    check_size,
+    message,
+    problem_body,
+    problem_response,
+)
 from shift_gateway.recordings import list_recordings, recording_path
 from shift_gateway.replica import Replica
 from shift_gateway.settings import GatewaySettings
@@ -93,6 +102,7 @@ def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastA
         version="v1",
         lifespan=lifespan,
         license_info={"name": "MIT"},
+        responses={"default": PROBLEM_RESPONSE},
     )
     app.add_middleware(BodyLimit)
     app.add_exception_handler(ShiftError, _on_shift_error)
@@ -160,9 +170,11 @@ def _add_sessions(app: FastAPI, gateway: Gateway) -> None:
         return await gateway.door.session(check_id("session", session))
 
     @app.post("/v1/sessions/{session}/end", tags=["sessions"])
-    async def end_session(session: str) -> dict[str, Any]:
-        """End a session; answered once its recording is finished."""
-        return await gateway.door.end(check_id("session", session))
+    async def end_session(session: str, request: Request) -> dict[str, Any]:
+        """End a session; answered once its recording is finished. It needs no body and takes no notice of one."""
+        await gateway.replica.view(check_id("session", session))
+        await request.body()
+        return await gateway.door.end(session)
 
     @app.get("/v1/sessions/{session}/config", tags=["configuration"])
     async def get_config(session: str) -> dict[str, Any]:
@@ -173,11 +185,7 @@ def _add_sessions(app: FastAPI, gateway: Gateway) -> None:
     async def patch_config(session: str, request: Request) -> dict[str, Any]:
         """Change the study in force by a JSON merge patch (RFC 7386)."""
         await gateway.replica.view(check_id("session", session))
-        patch = await json_body(request)
-        if not isinstance(patch, dict):
-            rule = "a merge patch is an object of what is to change"
-            raise MalformedMessage(f"body: {rule}", (FieldError(field="body", value="", rule=rule),))
-        return await gateway.door.configure(session, patch)
+        return await gateway.door.configure(session, (await body(request, bodies.PatchBody)).root)
 
 
 _PATCH = {
@@ -202,8 +210,12 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
         await socket.accept()
         try:
             while True:
-                await socket.send_json(await _take_chunk(gateway, session, await socket.receive_text()))
-        except (WebSocketDisconnect, KeyError):  # KeyError: a binary message has no text
+                arrived = await socket.receive()
+                if arrived["type"] == "websocket.disconnect":
+                    return
+                raw = arrived.get("text") or arrived.get("bytes") or ""
+                await socket.send_json(await _take_chunk(gateway, session, raw))
+        except WebSocketDisconnect:
             return
 
     @app.post(
@@ -251,11 +263,12 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
         return _created(await gateway.door.mark(session, await body(request, bodies.MarkerBody)))
 
 
-async def _take_chunk(gateway: Gateway, session: str, text: str) -> dict[str, Any]:
+async def _take_chunk(gateway: Gateway, session: str, raw: str | bytes) -> dict[str, Any]:
     try:
         check_id("session", session)
         await gateway.replica.view(session)
-        chunk = message(text, GazeChunk)
+        check_size(len(raw))
+        chunk = message(raw, GazeChunk)
         return {**await gateway.door.gaze(session, chunk), "seq": chunk.seq}
     except ShiftError as e:
         return problem_body(e)

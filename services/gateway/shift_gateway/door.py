@@ -5,6 +5,7 @@ Each method takes what a request says and gives what is said back; errors are th
 
 from __future__ import annotations
 
+import asyncio
 import json
 from typing import Any
 
@@ -12,7 +13,7 @@ from shift_decider.core import ANY_TASK, decided
 from shift_runtime.clock import Clock
 from shift_runtime.door import READ_WAIT_S, CommandDoor
 from shift_runtime.mesh_client import MeshClient
-from shift_schemas.errors import Unavailable
+from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, shorten
 from shift_schemas.messages import Observation, Seen, Session
 from shift_schemas.step import NotYet, covers
 
@@ -39,6 +40,8 @@ class Door(CommandDoor):
         """Every session."""
         if not await self.replica.reader.pull("recorder") and "recorder" in self.replica.missing:
             raise Unavailable("the recorder does not answer, so nobody knows which sessions there are")
+        live = [view for view in self.replica.views.values() if view.fact.state != "ended"]
+        await asyncio.gather(*(self._read(view, tuple(view.sequences)) for view in live))
         return [session_body(view) for view in self.replica.views.values()]
 
     async def observation(self, session: str) -> dict[str, Any]:
@@ -66,6 +69,17 @@ class Door(CommandDoor):
         if view.config is None:
             raise Unavailable("the recorder has put out no configuration of this session yet")
         return {**json.loads(view.config.study), "version": view.config.version}
+
+    async def configure(self, session: str, patch: dict[str, Any]) -> dict[str, Any]:
+        """Change the study in force. ``version`` may come along as it was read; it counts the changes itself."""
+        if "version" in patch:
+            version, given = (await self.config(session))["version"], patch["version"]
+            if given != version or isinstance(given, bool):
+                rule = f"it cannot be changed: it counts the changes and is {version} now; leave it out"
+                raise MalformedMessage(
+                    f"version: {rule}", (FieldError(field="version", value=shorten(given), rule=rule),)
+                )
+        return await super().configure(session, {name: v for name, v in patch.items() if name != "version"})
 
     async def preview(self, session: str, task: str) -> dict[str, Any]:
         """What a decision made now would carry; the decider's own core on the replica, no side effect."""

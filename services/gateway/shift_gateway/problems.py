@@ -18,6 +18,28 @@ M = TypeVar("M", bound=BaseModel)
 MEDIA_TYPE = "application/problem+json"
 
 
+_TEXT = {"type": "string"}
+PROBLEM_RESPONSE: dict[str, Any] = {
+    "description": "A problem (RFC 9457)",
+    "content": {
+        MEDIA_TYPE: {
+            "schema": {
+                "type": "object",
+                "required": ["type", "title", "status", "detail", "errors"],
+                "properties": {
+                    "type": _TEXT,
+                    "title": _TEXT,
+                    "status": {"type": "integer"},
+                    "detail": _TEXT,
+                    "errors": {"type": "array", "items": FieldError.model_json_schema()},
+                },
+            }
+        }
+    },
+}
+"""What every path of the OpenAPI document answers where it does not do what it is asked."""
+
+
 def problem_body(error: ShiftError) -> dict[str, Any]:
     """The problem document of an error."""
     return {
@@ -43,9 +65,10 @@ def check_id(name: str, value: str) -> str:
     return value
 
 
-async def json_body(request: Request) -> Any:
-    """The body as JSON. Raises :class:`MalformedMessage`, also for a key given twice."""
-    return parse_json(await request.body())
+def check_size(size: int) -> None:
+    """Raise :class:`TooLarge` where a body or a WebSocket's message is above the limit, in bytes."""
+    if size > BODY_LIMIT:
+        raise TooLarge(f"the body is above {BODY_LIMIT // 1024} KB; send gaze in smaller chunks")
 
 
 async def body(request: Request, kind: type[M]) -> M:
@@ -63,7 +86,10 @@ def message(raw: bytes | str, kind: type[M]) -> M:
 
 
 class BodyLimit:
-    """ASGI middleware: refuses bodies above the limit, also those that come in pieces without a length."""
+    """ASGI middleware: a body above the limit is refused when it is read, also one in pieces without a length.
+
+    Raised from ``receive``, so that nothing is done with a part of it, and ids and session are looked at before.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -74,32 +100,14 @@ class BodyLimit:
             await self.app(scope, receive, send)
             return
         length = dict(scope["headers"]).get(b"content-length", b"")
-        if length.isdigit() and int(length) > BODY_LIMIT:
-            await _too_large(scope, receive, send)
-            return
-        total, refused, started = 0, False, False
+        announced, received = int(length[:20]) if length.isdigit() else 0, 0
 
         async def counted() -> Message:
-            nonlocal total, refused
+            nonlocal received
+            check_size(announced)
             piece = await receive()
-            total += len(piece.get("body", b""))
-            if total > BODY_LIMIT:
-                refused = True
-                return {"type": "http.request", "body": b"", "more_body": False}
+            received += len(piece.get("body", b""))
+            check_size(received)
             return piece
 
-        async def unless_refused(piece: Message) -> None:
-            nonlocal started
-            if refused and not started:
-                return
-            started = True
-            await send(piece)
-
-        await self.app(scope, counted, unless_refused)
-        if refused and not started:
-            await _too_large(scope, receive, send)
-
-
-async def _too_large(scope: Scope, receive: Receive, send: Send) -> None:
-    error = TooLarge(f"the body is above {BODY_LIMIT // 1024} KB; send gaze in smaller chunks")
-    await problem_response(error)(scope, receive, send)
+        await self.app(scope, counted, send)
