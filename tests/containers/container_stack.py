@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-SERVICES = ("router", "recorder", "monitor", "decider", "learner", "gateway")
+SERVICES = ("router", "recorder", "monitor", "decider", "learner", "gateway", "simulator")
 
 
 def run(*command: str, env: dict[str, str] | None = None, check: bool = True) -> str:

@@ -91,6 +91,14 @@ def test_gateway_alone_has_a_port_and_on_this_machine_only(stack: Stack) -> None
     assert not any(ports.values())
 
 
+def test_a_simulated_person_is_in_session_demo(stack: Stack) -> None:
+    tour = Tour(stack.url, "demo")
+    deadline = time.monotonic() + PATIENCE_S
+    while tour.ask("GET", tour.path)["counts"].get("performance", 0) == 0:
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+
+
 def test_session_lives_through_kills_and_a_stop(stack: Stack, capsys: pytest.CaptureFixture[str]) -> None:
     tour = Tour(stack.url, "tour")
     tour.start()

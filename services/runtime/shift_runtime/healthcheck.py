@@ -1,7 +1,8 @@
 """``python -m shift_runtime.healthcheck SERVICE``: exit code 0 where the service answers and is ready.
 
 For containers, every few seconds, so it imports little: Zenoh and the standard library. A service is asked
-over Zenoh, through its worker's own loop; the gateway by ``/readyz``; the router by a connection.
+over Zenoh, through its worker's own loop; the gateway by ``/readyz``; the router by a connection; the simulated
+person by whether it could reach the gateway (``SHIFT_URL``).
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 import os
 import socket
 import sys
+from urllib.parse import urlsplit
 
 TIMEOUT_S = 2.0
 
@@ -18,9 +20,9 @@ TIMEOUT_S = 2.0
 def main(arguments: list[str]) -> int:
     """The exit code for ``[service]``; 2 for wrong use."""
     if len(arguments) != 1:
-        sys.stderr.write("give one service: router, gateway, recorder, monitor, decider or learner\n")
+        sys.stderr.write("give one service: router, gateway, recorder, monitor, decider, learner or simulator\n")
         return 2
-    checks = {"router": _router, "gateway": _gateway}
+    checks = {"router": _router, "gateway": _gateway, "simulator": _simulator}
     try:
         healthy = checks[arguments[0]]() if arguments[0] in checks else _service(arguments[0])
     except OSError as e:
@@ -37,8 +39,17 @@ def _router() -> bool:
 
 
 def _gateway() -> bool:
-    connection = http.client.HTTPConnection("127.0.0.1", int(os.environ.get("SHIFT_PORT", "8080")), timeout=TIMEOUT_S)
-    connection.request("GET", "/readyz")
+    return _answers("127.0.0.1", int(os.environ.get("SHIFT_PORT", "8080")), "/readyz")
+
+
+def _simulator() -> bool:
+    url = urlsplit(os.environ.get("SHIFT_URL", "http://127.0.0.1:8080"))
+    return _answers(url.hostname or "127.0.0.1", url.port or 80, "/healthz")
+
+
+def _answers(host: str, port: int, path: str) -> bool:
+    connection = http.client.HTTPConnection(host, port, timeout=TIMEOUT_S)
+    connection.request("GET", path)
     return connection.getresponse().status == 200
 
 

@@ -27,6 +27,7 @@ class DemoSettings(MeshSettings):
     """Where the gateway is, and how fast the person works."""
 
     url: str = Field(default="http://127.0.0.1:8080", description="The gateway.")
+    demo: bool = Field(default=True, description="Whether there is a simulated person at all.")
     demo_every_s: float = Field(default=2.0, gt=0, le=3600, description="Seconds between interactions.")
     demo_user: str = Field(default="B", description="Which of the paper's users: A, B, C or D.")
 
@@ -40,7 +41,11 @@ def main() -> None:
         settings = read_settings(DemoSettings)
         assert isinstance(settings, DemoSettings)
         configure_logs("simulator", settings)
-        _live(settings, stop)
+        if settings.demo:
+            _live(settings, stop)
+        else:
+            log.info("no simulated person is wanted")
+            stop.wait()
     except ShiftError as e:
         sys.exit(f"shift_simulator: {e.detail}")
 
