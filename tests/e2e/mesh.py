@@ -96,12 +96,18 @@ class LiveMesh:
 
 
 @contextmanager
-def running_mesh(folder: Path, *flags: str, port: int | None = None, zenoh: str | None = None) -> Iterator[LiveMesh]:
+def running_mesh(
+    folder: Path,
+    *flags: str,
+    port: int | None = None,
+    zenoh: str | None = None,
+    program: tuple[str, ...] = ("-m", "shift_cli.main"),
+) -> Iterator[LiveMesh]:
     """``shift-mesh up`` until left; stopped, and its log shown where something went wrong."""
     port = port or free_port()
     zenoh = zenoh or f"tcp/127.0.0.1:{free_port()}"
     log = folder / "mesh.log"
-    command = [sys.executable, "-m", "shift_cli.main", "up", "--port", str(port), "--zenoh", zenoh]
+    command = [sys.executable, *program, "up", "--port", str(port), "--zenoh", zenoh]
     folder.mkdir(parents=True, exist_ok=True)
     with open(log, "ab") as output:
         process = subprocess.Popen(

@@ -25,8 +25,10 @@ _SIGNALS = {*_STOPS, signal.SIGCHLD}
 POLL_S = 0.1
 GRACE_S = 12.0
 """How long a service may take to stop; the recorder finishes files in it."""
-STEADY_S = 10.0
-"""After so long a life, the next death is a first one again."""
+STEADY_S = 3.0
+"""After so long a life, the next death is a first one again; who cannot even start does not get there."""
+LONGEST_PAUSE_S = 2.0
+"""Before the next try; with the start itself below the 5 s of RELIABILITY.md, row 3."""
 SETTINGS_WRONG = 2
 
 
@@ -115,7 +117,7 @@ class Supervisor:
     def _mourn(self, program: Program, status: int) -> None:
         now = time.monotonic()
         program.deaths = 0 if now - program.started > STEADY_S else program.deaths + 1
-        pause = min(5.0, 0.1 * 2**program.deaths) if program.deaths else 0.0
+        pause = min(LONGEST_PAUSE_S, 0.1 * 2**program.deaths) if program.deaths else 0.0
         program.due = now + pause
         code = os.waitstatus_to_exitcode(status)
         why = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
