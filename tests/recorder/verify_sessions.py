@@ -10,6 +10,7 @@ import json
 import random
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from shift_monitor import core as monitor
 from shift_recorder import core as recorder
 from shift_recorder.checksum import sha256_of, write_checksum
 from shift_recorder.finishing import finish_recording
+from shift_recorder.front import attachments_of, metadata_of
 from shift_recorder.mcap_schemas import recorded_json, subject_schemas
 from shift_recorder.parsing import Attachment
 from shift_recorder.reading import RecordedMessage, Recording
@@ -42,7 +44,6 @@ from shift_schemas.messages import (
 )
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import NotYet
-from shift_schemas.study_text import study_from_json
 
 CORES: dict[str, Callable[..., Any]] = {
     "recorder": recorder.step, "monitor": monitor.step, "decider": decider.step, "learner": learner.step,
@@ -186,7 +187,9 @@ class Session:
         self.do("recorder", EndSession(command_id="end", session="s1"))
         self.deliver()
         self.now_ns += 1_000_000
-        self._put("recorder", recorder.ended(self.states["recorder"], Stamp.of(self.now_ns)))
+        state: recorder.RecorderState = self.states["recorder"]
+        self.states["recorder"] = replace(state, fact=recorder.ended(state, Stamp.of(self.now_ns)))
+        self._put("recorder", self.states["recorder"].fact)
         self.record()
         return self
 
@@ -213,24 +216,14 @@ class Session:
     def metadata(self) -> dict[str, dict[str, str]]:
         """As the recorder's shell writes it."""
         state: recorder.RecorderState = self.states["recorder"]
-        fact = state.fact
-        return {
-            "shift:session": {
-                "session": "s1", "participant": fact.participant, "study": fact.study, "condition": "",
-                "seed": str(fact.seed), "started": f"{fact.started.sec}.{fact.started.nsec:09d}", "ended": "",
-                "replay_of": "", "software": f"shift-mesh/{fact.software}", "revision": "",
-            },
-            "shift:config": {"version": str(state.config.version), "study": state.config.study},
-        }  # fmt: skip
+        return metadata_of(state)
 
     def attachments(self) -> list[Attachment]:
         """As the recorder's shell writes them."""
         state: recorder.RecorderState = self.states["recorder"]
         policies = [recorded_json(fact) for subject, _, fact in self.recorded if subject == "policy"]
-        table = study_from_json(state.config.study).scoring.table.model_dump_json().encode()
-        files = {"study.json": state.original.encode(), "scoring-table.json": table}
-        if policies:
-            files |= {"policy-first.json": policies[0], "policy-last.json": policies[-1]}
+        ends = (policies[0], policies[-1]) if policies else None
+        files = attachments_of(state, ends)
         return [Attachment(name, "application/json", data, START) for name, data in files.items()]
 
 

@@ -13,12 +13,11 @@ from typing import Any
 
 from shift_schemas.errors import ShiftError
 from shift_schemas.messages import Config, Configure, EndSession, Fact, Mark, Marker, Session, StartSession
-from shift_schemas.stamps import Stamp
 
 from shift_recorder.core import RecorderState, ended, step
 from shift_recorder.differences import Difference, Differs, Placed, compare, differ, is_missing
+from shift_recorder.front import attachments_of, metadata_of
 from shift_recorder.parsing import Attachment
-from shift_recorder.writing import CONFIG_METADATA, SESSION_METADATA
 
 STUDY = "study.json"
 LAST = 2**61
@@ -150,39 +149,15 @@ def check_front(
     policies: tuple[bytes, bytes] | None,
 ) -> None:
     """Compare metadata and attachments with the messages that they repeat. Raises :class:`Differs`."""
-    for name, wanted in _metadata(state).items():
+    for name, wanted in metadata_of(state).items():
         found = metadata.get(name, {})
-        for key, values in wanted.items():
-            if found.get(key) not in values:
-                _front("metadata", f"{name}.{key}", found.get(key), values[0])
-    for name, data in _attached(state, policies).items():
+        for key, value in wanted.items():
+            if found.get(key) != value:
+                _front("metadata", f"{name}.{key}", found.get(key), value)
+    for name, data in attachments_of(state, policies).items():
         there = attachments.get(name)
         if there is None or (there.data != data and _plain(there.data) != _plain(data)):
             _front("attachment", name, _plain(there.data) if there else None, _plain(data))
-
-
-def _metadata(state: RecorderState) -> dict[str, dict[str, tuple[str, ...]]]:
-    fact = state.fact
-    at_end = (_seconds(fact.ended), "") if fact.ended else ("",)
-    values = {
-        "session": fact.session, "participant": fact.participant, "study": fact.study,
-        "condition": fact.condition or "", "seed": str(fact.seed), "started": _seconds(fact.started),
-        "replay_of": fact.replay_of, "software": f"shift-mesh/{fact.software}", "revision": fact.revision,
-    }  # fmt: skip
-    return {
-        SESSION_METADATA: {key: (value,) for key, value in values.items()} | {"ended": at_end},
-        CONFIG_METADATA: {"version": (str(state.config.version),), "study": (state.config.study,)},
-    }
-
-
-def _attached(state: RecorderState, policies: tuple[bytes, bytes] | None) -> dict[str, bytes]:
-    table = json.dumps(json.loads(state.config.study)["scoring"]["table"]).encode()
-    found = {"scoring-table.json": table}
-    return found | dict(zip(("policy-first.json", "policy-last.json"), policies or (), strict=False))
-
-
-def _seconds(stamp: Stamp) -> str:
-    return f"{stamp.sec}.{stamp.nsec:09d}"
 
 
 def _plain(data: bytes) -> Any:

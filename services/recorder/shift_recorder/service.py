@@ -14,6 +14,7 @@ import os
 import shutil
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -33,6 +34,7 @@ from shift_schemas.study_text import study_from_json
 from shift_recorder import core
 from shift_recorder.core import END_ID, FinishSession, RecorderState
 from shift_recorder.finishing import FinishedRecording, finish_recording
+from shift_recorder.front import attachments_of, metadata_of
 from shift_recorder.mcap_schemas import recorded_json, subject_schemas
 from shift_recorder.parsing import Attachment
 from shift_recorder.reading import Recording
@@ -280,7 +282,8 @@ class RecorderWorker(Worker[RecorderState]):
         await self._converge(session)
         state = self._state(session)
         assert state is not None
-        self._write(session, state, core.ended(state, self.clock.now()), self.journal.heads[session] + 1)
+        state = replace(state, fact=core.ended(state, self.clock.now()))
+        self._write(session, state, state.fact, self.journal.heads[session] + 1)
         self._flush()
         if behind := self._behind(session):
             raise Unavailable(self._alarm or f"the recorder has not written all of the {behind[0]}; ask again")
@@ -326,8 +329,11 @@ class RecorderWorker(Worker[RecorderState]):
             sources,
             target,
             schemas=subject_schemas(study_from_json(state.config.study), _states_of(policies)),
-            metadata=_metadata(state),
-            attachments=_attachments(state, policies),
+            metadata=metadata_of(state),
+            attachments=[
+                Attachment(name, "application/json", data, state.fact.started.ns)
+                for name, data in attachments_of(state, policies).items()
+            ],
         )
 
     async def _pause(self, session: str) -> None:
@@ -366,32 +372,3 @@ def _first_and_last_policy(sources: Iterable[Path]) -> tuple[bytes, bytes] | Non
 
 def _states_of(policies: tuple[bytes, bytes] | None) -> tuple[str, ...]:
     return tuple(json.loads(policies[0])["states"]) if policies else ()
-
-
-def _metadata(state: RecorderState) -> dict[str, dict[str, str]]:
-    fact = state.fact
-    ended = f"{fact.ended.sec}.{fact.ended.nsec:09d}" if fact.ended else ""
-    return {
-        "shift:session": {
-            "session": fact.session,
-            "participant": fact.participant,
-            "study": fact.study,
-            "condition": fact.condition or "",
-            "seed": str(fact.seed),
-            "started": f"{fact.started.sec}.{fact.started.nsec:09d}",
-            "ended": ended,
-            "replay_of": fact.replay_of,
-            "software": f"shift-mesh/{fact.software}",
-            "revision": fact.revision,
-        },
-        "shift:config": {"version": str(state.config.version), "study": state.config.study},
-    }
-
-
-def _attachments(state: RecorderState, policies: tuple[bytes, bytes] | None) -> list[Attachment]:
-    at = state.fact.started.ns
-    table = json.loads(state.config.study)["scoring"]["table"]
-    files = {"study.json": state.original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
-    if policies:
-        files |= {"policy-first.json": policies[0], "policy-last.json": policies[1]}
-    return [Attachment(name, "application/json", data, at) for name, data in files.items()]

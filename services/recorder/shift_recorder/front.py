@@ -1,0 +1,44 @@
+"""What stands in front of a recording's messages: whose it is, its configuration, the study, the policies. Pure.
+
+It repeats what the messages say, for people and programs that do not read them; ``verify`` compares the two.
+"""
+
+from __future__ import annotations
+
+import json
+
+from shift_schemas.stamps import Stamp
+
+from shift_recorder.core import RecorderState
+from shift_recorder.writing import CONFIG_METADATA, SESSION_METADATA
+
+
+def metadata_of(state: RecorderState) -> dict[str, dict[str, str]]:
+    """The metadata records, by name; stamps are seconds since the epoch, '' is none."""
+    fact = state.fact
+    return {
+        SESSION_METADATA: {
+            "session": fact.session,
+            "participant": fact.participant,
+            "study": fact.study,
+            "condition": fact.condition or "",
+            "seed": str(fact.seed),
+            "started": _seconds(fact.started),
+            "ended": _seconds(fact.ended) if fact.ended else "",
+            "replay_of": fact.replay_of,
+            "software": f"shift-mesh/{fact.software}",
+            "revision": fact.revision,
+        },
+        CONFIG_METADATA: {"version": str(state.config.version), "study": state.config.study},
+    }
+
+
+def attachments_of(state: RecorderState, policies: tuple[bytes, bytes] | None) -> dict[str, bytes]:
+    """The attached JSON files, by name; ``policies`` are the first and the last one, as recorded."""
+    table = json.loads(state.config.study)["scoring"]["table"]
+    files = {"study.json": state.original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
+    return files | dict(zip(("policy-first.json", "policy-last.json"), policies or (), strict=False))
+
+
+def _seconds(stamp: Stamp) -> str:
+    return f"{stamp.sec}.{stamp.nsec:09d}"
