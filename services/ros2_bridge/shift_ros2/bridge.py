@@ -32,8 +32,8 @@ from shift_ros2.settings import BridgeSettings
 log = structlog.get_logger()
 GAZE_WAIT_S = 0.2
 """How long a request waits for gaze that came before it; DESIGN.md, "Read your own writes"."""
-LANES = 64
-"""Gaze sources at a time; a further one takes the place of one that is quiet."""
+SESSIONS = 64
+"""Sessions with gaze at a time; a further one takes the place of one that is quiet."""
 BIND_EVERY_S = 1.0
 
 
@@ -50,7 +50,7 @@ class Bridge:
         self.session = settings.bound_session
         self.diagnostics = Diagnostics(settings.diagnostics_s)
         self._about = (self.session, settings.task)
-        self._senders: OrderedDict[tuple[str, str], GazeSender] = OrderedDict()
+        self._senders: OrderedDict[str, GazeSender] = OrderedDict()
         self._reports = Reports(self.on_lost)
         self._persons = Persons()
         self._attached: set[str] = set()
@@ -124,19 +124,18 @@ class Bridge:
     # --- in ---
 
     def _take_gaze(self, arrival: GazeArrival) -> None:
-        session, source = arrival.session or self.session, arrival.chunk.source
-        sender = self._senders.get((session, source)) or self._new_sender(session, source)
-        self._senders.move_to_end((session, source))
+        session = arrival.session or self.session
+        sender = self._senders.get(session) or self._new_sender(session)
+        self._senders.move_to_end(session)
         sender.put(arrival)
 
-    def _new_sender(self, session: str, source: str) -> GazeSender:
-        if len(self._senders) >= LANES:
-            quiet = next((key for key, s in self._senders.items() if s.quiet), None)
+    def _new_sender(self, session: str) -> GazeSender:
+        if len(self._senders) >= SESSIONS:
+            quiet = next((of for of, sender in self._senders.items() if sender.quiet), None)
             if quiet is None:
-                raise Unavailable(f"gaze of {LANES} sources waits already; there is no room for another")
+                raise Unavailable(f"gaze of {SESSIONS} sessions waits already; there is no room for another")
             self._senders.pop(quiet).close()
-        sender = GazeSender(self.door, self.settings, session, source, self._attach, self._gaze_lost)
-        self._senders[session, source] = sender
+        sender = self._senders[session] = GazeSender(self.door, self.settings, session, self._attach, self._gaze_lost)
         return sender
 
     async def _report(self, session: str, report: mapping.PerformanceMessage) -> None:
@@ -149,9 +148,8 @@ class Bridge:
             rule = 'publish {"task": "..."} on shift/task before the request, or set parameter task'
             raise MalformedMessage(f"task: {rule}", (FieldError(field="task", value="", rule=rule),))
         await self._attach(session)
-        for (of, _), sender in list(self._senders.items()):
-            if of == session and not sender.quiet:
-                await sender.passed(GAZE_WAIT_S)
+        if (sender := self._senders.get(session)) is not None and not sender.quiet:
+            await sender.passed(GAZE_WAIT_S)
         await self._reports.passed(READ_WAIT_S)
         answer, repeat = await self.door.decide(session, DecisionBody(task=task, decision_id=request_id))
         text = mapping.text_of_answer(answer)

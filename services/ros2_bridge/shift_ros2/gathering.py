@@ -1,39 +1,46 @@
 """Single gaze samples become chunks; what has no number gets one. Pure: the shell says when to take.
 
-A lane is one gaze source of one session. Chunks that a source numbered itself pass as they are, in their
-order; unnumbered ones are joined, since chunks of ten carry 3.5 times the samples (DESIGN.md).
+A lane is the gaze of one session, in its order of arrival: a source that begins to speak takes over, so what the
+former one said must be in before. Chunks that a source numbered itself pass as they are; unnumbered ones are
+joined, since chunks of ten carry 3.5 times the samples (DESIGN.md).
 """
 
 from __future__ import annotations
 
-from collections import deque
+from collections import OrderedDict, deque
 
 from shift_schemas.errors import FieldError, MalformedMessage, shorten
 from shift_schemas.messages import GazeChunk
 
 from shift_ros2.mapping import COLUMNS, GazeArrival
 
+SOURCES = 256
+"""So many sources are remembered; of an older one the times are no longer compared here, only by the monitor."""
+
 
 class Lane:
-    """What waits of one source."""
+    """What waits of one session."""
 
-    def __init__(self, source: str) -> None:
-        self.source = source
+    def __init__(self) -> None:
         self.samples = 0
         """Samples that wait."""
         self._waiting: deque[GazeArrival] = deque()
-        self._last_t: float | None = None
+        self._last_t: OrderedDict[str, float] = OrderedDict()
 
     def __bool__(self) -> bool:
         return bool(self._waiting)
 
     def add(self, arrival: GazeArrival) -> None:
         """Take it in. Raises :class:`MalformedMessage` for a time that does not rise: it would spoil its chunk."""
-        t = arrival.chunk.t
-        if not arrival.numbered and self._last_t is not None and t[0] <= self._last_t:
-            rule = f"t must rise; the sample before was at {self._last_t} s, {self.source}'s clock"
+        t, source = arrival.chunk.t, arrival.chunk.source
+        last = self._last_t.get(source)
+        if not arrival.numbered and last is not None and t[0] <= last:
+            rule = f"t must rise; the sample before was at {last} s, {source}'s clock"
             raise MalformedMessage(f"gaze: t: {rule}", (FieldError(field="t", value=shorten(t[0]), rule=rule),))
-        self._last_t = t[-1]
+        self._last_t[source] = t[-1]
+        self._last_t.move_to_end(source)
+        if len(self._last_t) > SOURCES:
+            self._last_t.popitem(last=False)
         self.samples += len(t)
         self._waiting.append(arrival)
 
@@ -66,4 +73,5 @@ def joined(arrivals: list[GazeArrival], seq: int) -> GazeChunk:
 
 
 def _alike(a: GazeArrival, b: GazeArrival) -> bool:
-    return not b.numbered and all((getattr(a.chunk, n) is None) == (getattr(b.chunk, n) is None) for n in COLUMNS)
+    same = a.chunk.source == b.chunk.source and not b.numbered
+    return same and all((getattr(a.chunk, n) is None) == (getattr(b.chunk, n) is None) for n in COLUMNS)

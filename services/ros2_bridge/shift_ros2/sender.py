@@ -1,14 +1,15 @@
-"""Sends the gaze of one source to the monitor, chunk by chunk, each acknowledged before the next."""
+"""Sends the gaze of one session to the monitor, chunk by chunk, each acknowledged before the next."""
 
 from __future__ import annotations
 
 import asyncio
+from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 
 from shift_runtime.door import CommandDoor
 from shift_schemas.errors import MalformedMessage, ShiftError, Unavailable
 
-from shift_ros2.gathering import Lane, joined
+from shift_ros2.gathering import SOURCES, Lane, joined
 from shift_ros2.mapping import GazeArrival
 from shift_ros2.progress import Progress
 from shift_ros2.settings import BridgeSettings
@@ -22,21 +23,20 @@ class GazeSender:
     """One lane and the task that empties it. ``attach`` makes sure of the session; ``lost`` is told what fell out."""
 
     def __init__(
-        self, door: CommandDoor, settings: BridgeSettings, session: str, source: str,
+        self, door: CommandDoor, settings: BridgeSettings, session: str,
         attach: Callable[[str], Awaitable[None]], lost: Lost,
     ) -> None:  # fmt: skip
         self._door = door
         self._settings = settings
         self._session = session
-        self._source = source
         self._attach = attach
         self._lost = lost
-        self._lane = Lane(source)
+        self._lane = Lane()
         self._progress = Progress()
         self._wake = asyncio.Event()
         self._ripe = asyncio.Event()
         self._hurried = False
-        self._next_seq: int | None = None
+        self._next_seq: OrderedDict[str, int] = OrderedDict()
         self._task = asyncio.get_running_loop().create_task(self._run())
 
     def put(self, arrival: GazeArrival) -> None:
@@ -97,8 +97,9 @@ class GazeSender:
             for one in taken:  # one bad sample must not cost its neighbours
                 await self._send([one])
         except ShiftError as e:
-            if isinstance(e, Unavailable) and not taken[0].numbered and self._next_seq is not None:
-                self._next_seq += 1  # whether it came in or not: where it did not, the gap is seen
+            source = taken[0].chunk.source
+            if isinstance(e, Unavailable) and not taken[0].numbered and source in self._next_seq:
+                self._next_seq[source] += 1  # whether it came in or not: where it did not, the gap is seen
             self._lost("gaze", e, samples)
 
     async def _hand_on(self, taken: list[GazeArrival]) -> None:
@@ -106,16 +107,20 @@ class GazeSender:
         if taken[0].numbered:
             chunk = taken[0].chunk
         else:
-            if self._next_seq is None:
-                self._next_seq = await self._first_seq()
-            chunk = joined(taken, self._next_seq)
+            source = taken[0].chunk.source
+            if source not in self._next_seq:
+                self._next_seq[source] = await self._first_seq(source)
+            chunk = joined(taken, self._next_seq[source])
         await self._door.gaze(self._session, chunk)
-        self._next_seq = chunk.seq + 1
+        self._next_seq[chunk.source] = chunk.seq + 1
+        self._next_seq.move_to_end(chunk.source)
+        if len(self._next_seq) > SOURCES:
+            self._next_seq.popitem(last=False)
 
-    async def _first_seq(self) -> int:
+    async def _first_seq(self, source: str) -> int:
         """Where the source's numbers go on: another bridge, or this one before a restart, may have begun them."""
         replica = self._door.replica
         view = await replica.view(self._session)
         if not await replica.reader.pull("monitor"):
             raise Unavailable("the monitor does not answer, so nobody knows how far this gaze source came")
-        return view.observation.seen.gaze.get(self._source, -1) + 1 if view.observation else 0
+        return view.observation.seen.gaze.get(source, -1) + 1 if view.observation else 0
