@@ -12,6 +12,9 @@ from shift_schemas.stamps import Stamp
 from shift_recorder.core import RecorderState
 from shift_recorder.writing import CONFIG_METADATA, SESSION_METADATA
 
+STUDY = "study.json"
+"""The attachment with the study as it was given, before its condition."""
+
 
 def metadata_of(state: RecorderState) -> dict[str, dict[str, str]]:
     """The metadata records, by name; stamps are seconds since the epoch, '' is none."""
@@ -36,7 +39,7 @@ def metadata_of(state: RecorderState) -> dict[str, dict[str, str]]:
 def attachments_of(state: RecorderState, policies: tuple[bytes, bytes] | None) -> dict[str, bytes]:
     """The attached JSON files, by name; ``policies`` are the first and the last one, as recorded."""
     table = json.loads(state.config.study)["scoring"]["table"]
-    files = {"study.json": state.original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
+    files = {STUDY: state.original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
     return files | dict(zip(("policy-first.json", "policy-last.json"), policies or (), strict=False))
 
 

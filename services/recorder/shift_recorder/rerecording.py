@@ -16,10 +16,9 @@ from shift_schemas.messages import Config, Configure, EndSession, Fact, Mark, Ma
 
 from shift_recorder.core import RecorderState, ended, step
 from shift_recorder.differences import Difference, Differs, Placed, compare, differ, is_missing
-from shift_recorder.front import attachments_of, metadata_of
+from shift_recorder.front import STUDY, attachments_of, metadata_of
 from shift_recorder.parsing import Attachment
 
-STUDY = "study.json"
 LAST = 2**61
 """The front only repeats: where a message differs as well, that is the first difference."""
 
@@ -155,6 +154,8 @@ def check_front(
             if found.get(key) != value:
                 _front("metadata", f"{name}.{key}", found.get(key), value)
     for name, data in attachments_of(state, policies).items():
+        if name == STUDY:
+            continue  # an input: the session's start is derived from it
         there = attachments.get(name)
         if there is None or (there.data != data and _plain(there.data) != _plain(data)):
             _front("attachment", name, _plain(there.data) if there else None, _plain(data))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,10 @@ def study_named(name: str, folder: Path) -> dict[str, Any]:
     """
     if not is_id(name):
         raise _refused(name, f"a study's name is an id: {ID_RULE}")
-    for path, text in _texts(folder):
-        if path == name:
-            return study_data(parse_study(text, f"{path}.yaml"))
-    known = ", ".join(sorted({path for path, _ in _texts(folder)}))
+    for stem, path in _files(folder):
+        if stem == name:
+            return study_data(parse_study(_text(path), path.name))
+    known = ", ".join(sorted({stem for stem, _ in _files(folder)}))
     raise _refused(name, f"there is no study of that name; there are {known}")
 
 
@@ -34,12 +35,18 @@ def _refused(name: str, rule: str) -> InvalidStudy:
     return InvalidStudy(f"study {error.value!r}: {rule}", (error,))
 
 
-def _texts(folder: Path) -> Iterator[tuple[str, str]]:
-    """File stem and text of every study, the folder's before the built-in ones."""
-    built_in = files("shift_schemas") / "studies"
-    for place in (folder, built_in):
+def _files(folder: Path) -> Iterator[tuple[str, Traversable]]:
+    """Stem and file of every study, the folder's before the built-in ones."""
+    for place in (folder, files("shift_schemas") / "studies"):
         if not place.is_dir():
             continue
         for path in sorted(place.iterdir(), key=lambda p: p.name):
-            if path.name.endswith((".yaml", ".yml")):
-                yield path.name.rsplit(".", 1)[0], path.read_bytes().decode(errors="replace")
+            if path.name.endswith((".yaml", ".yml")) and path.is_file():
+                yield path.name.rsplit(".", 1)[0], path
+
+
+def _text(path: Traversable) -> str:
+    try:
+        return path.read_bytes().decode(errors="replace")
+    except OSError as e:
+        raise InvalidStudy(f"{path.name} cannot be read: {e.strerror}") from e

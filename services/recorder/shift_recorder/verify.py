@@ -22,10 +22,11 @@ from shift_schemas.messages import Config, Fact, Observation, Session
 
 from shift_recorder.checksum import check
 from shift_recorder.differences import Difference, Differs, NotRecorded, Placed, differ, name_of
+from shift_recorder.front import STUDY
 from shift_recorder.reading import RecordedMessage, Recording, fact_of
 from shift_recorder.redeciding import Redecide
 from shift_recorder.refolding import Inputs, LearnerRefold, MonitorRefold
-from shift_recorder.rerecording import LAST, STUDY, Rerecord, check_front
+from shift_recorder.rerecording import LAST, Rerecord, check_front
 from shift_recorder.writing import CONFIG_METADATA
 
 Progress = Callable[[int, int], None]
