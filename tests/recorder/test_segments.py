@@ -135,6 +135,22 @@ def test_kill_9_loses_nothing_that_was_flushed(tmp_path: Path, at: int) -> None:
     assert not recording.report.damaged
 
 
+READ_ONLY = """
+import os, sys
+from pathlib import Path
+from recorder_fixtures import SCHEMAS
+from shift_recorder.segments import SegmentWriter
+from shift_recorder.storage import StorageFailed
+if os.geteuid() == 0:
+    os.seteuid(65534)
+try:
+    SegmentWriter(Path(sys.argv[1]), "s1", SCHEMAS)
+except StorageFailed as e:
+    print("refused" if "s1" in e.detail else e.detail)
+else:
+    print("written")
+"""
+
 FULL = """
 import resource, signal, sys
 from pathlib import Path
@@ -169,11 +185,13 @@ def test_a_full_disk_is_said_and_what_was_flushed_can_be_read(tmp_path: Path) ->
     assert recording.report.bytes == recording.path.stat().st_size  # the failed chunk was cut off again
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
 def test_a_read_only_folder_is_said(tmp_path: Path) -> None:
-    tmp_path.chmod(0o500)
-    with pytest.raises(StorageFailed, match=r"s1"):
-        SegmentWriter(tmp_path, "s1", SCHEMAS)
+    """Root may write anywhere, so a process without root's rights tries it."""
+    tmp_path.chmod(0o555)
+    for parent in tmp_path.parents[:3]:
+        parent.chmod(parent.stat().st_mode | 0o011)
+    done = run(READ_ONLY, str(tmp_path))
+    assert done.stdout.split() == ["refused"], done.stderr
 
 
 def test_a_file_in_the_folders_place_is_said(tmp_path: Path) -> None:
