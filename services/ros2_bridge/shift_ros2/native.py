@@ -75,19 +75,20 @@ class NativeBackend:
 
     def publish(self, topic: str, text: str) -> None:
         """See :class:`~shift_ros2.backend.Backend`."""
-        self._publishers[topic].put(cdr.encode_string(text))
+        if topic in self._publishers:  # after close there are none
+            self._publishers[topic].put(cdr.encode_string(text))
 
     @property
     def state(self) -> str:
         """See :class:`~shift_ros2.backend.Backend`."""
-        return (
-            "" if list(self._session.info.routers_zid()) else f"a Zenoh router for ROS at {self._settings.ros_router}"
-        )
+        met = list(self._session.info.routers_zid())
+        return "" if met else f"for a Zenoh router for ROS at {self._settings.ros_router}"
 
     async def close(self) -> None:
         """See :class:`~shift_ros2.backend.Backend`."""
         for task in list(self._answering):
             task.cancel()
+        self._publishers.clear()
         for thing in reversed(self._declared):
             thing.undeclare()
         self._declared.clear()
