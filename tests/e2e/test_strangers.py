@@ -6,6 +6,7 @@ import itertools
 import json
 import random
 import threading
+import time
 from collections.abc import Iterator
 
 import httpx
@@ -202,3 +203,23 @@ def test_nonsense_as_any_command_is_counted_and_refused(mesh: LiveMesh, procedur
     finally:
         session.close()
     mesh.until(lambda: dropped(mesh)[owner] >= before + 4)
+
+
+def test_well_formed_facts_of_a_session_to_come_take_no_place_in_it(mesh: LiveMesh) -> None:
+    """A stranger is first with sequence 1 and 2 of every owner; the owners' own are read all the same."""
+    session = zenoh.open(zenoh_config("client", connect=mesh.zenoh))
+    whose = {"session": "to-come", "stamp": STAMP}
+    fixation = {**whose, "source": "eyes", "start_s": 0.0, "duration_s": 0.1, "x": 0.5, "y": 0.5, "aoi": ""}
+    override = {**whose, "override_id": "o1", "task": "task-1", "strategy": {}, "reason": ""}
+    marker = {**whose, "marker_id": "m1", "text": ""}
+    try:
+        for sequence in (b"1", b"2"):
+            for subject, fact in (("fixation", fixation), ("override", override), ("marker", marker)):
+                session.put(f"shift/v1/to-come/{subject}", json.dumps(fact).encode(), attachment=sequence)
+        time.sleep(0.3)
+    finally:
+        session.close()
+    done = interact(mesh, "to-come", 7, 10)
+    assert essences(done) == expected(7, 10)
+    messages = check_recording(mesh, done)
+    assert not {"fixation", "override", "marker"} & set(messages)
