@@ -44,9 +44,12 @@ def process(module: str, folder: Path, **environment: str) -> Iterator[subproces
     try:
         yield running
     finally:
-        if running.poll() is None:
-            running.terminate()
-        assert running.wait(30) == 0, (folder / f"{module}.log").read_text()
+        running.terminate()
+        try:
+            code = running.wait(30)
+        finally:
+            running.kill()
+        assert code == 0, (folder / f"{module}.log").read_text()
 
 
 @pytest.mark.parametrize("order", [SERVICES, tuple(reversed(SERVICES))], ids=["gateway first", "recorder first"])
