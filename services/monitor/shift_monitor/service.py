@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from shift_monitor import core
-from shift_monitor.core import MonitorState
 from shift_runtime.worker import Core
 from shift_schemas.keys import READS
+
+from shift_monitor import core
+from shift_monitor.core import MonitorState
 
 CORE: Core[MonitorState] = Core(
     name="monitor",
