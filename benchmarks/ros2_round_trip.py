@@ -4,7 +4,7 @@
 same client's call of a Trigger server that answers at once (the same backend, no mesh behind it), *get* one
 Zenoh request between two processes, *fsync* 4 KB to the disk of the journals. Medians, microseconds.
 
-    python benchmarks/ros2_round_trip.py [--calls 300] [--backend native|rclpy]
+    python benchmarks/ros2_round_trip.py [--calls 200] [--backend native|rclpy] [--check]
 
 For ``rclpy`` the client and the bridge run in the environment that tests/ros2/peers.py makes.
 """
@@ -31,16 +31,17 @@ LIMIT = 1.5
 
 
 def main() -> None:
-    """Measure and print; exit code 1 above the limit."""
+    """Measure and print; with ``--check`` exit code 1 above the limit."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--calls", type=int, default=300)
+    parser.add_argument("--calls", type=int, default=200)
     parser.add_argument("--backend", default="native")
+    parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         figures = measure(folder, options.backend, options.calls, stack)
     print(json.dumps(figures))
-    sys.exit(figures["ratio"] > LIMIT)
+    sys.exit(options.check and figures["ratio"] > LIMIT)
 
 
 def measure(folder: Path, backend: str, calls: int, stack: ExitStack) -> dict[str, float]:
