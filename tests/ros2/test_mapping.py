@@ -59,6 +59,7 @@ def test_a_sample_is_a_chunk_of_one_that_the_bridge_numbers() -> None:
         ({"t": 1.0, "aoi": "a", "source": "../a"}, "source", "../a", "pattern"),
         ({"t": 1.0, "aoi": "a", "extra": 1}, "extra", "1", "not permitted"),
         ({"t": 1.0, "aoi": "a", "seq": -1}, "seq", "-1", "greater"),
+        ({"t": 1.0, "aoi": "\ud800"}, "data", "", "surrogate"),
     ],
 )
 def test_mistakes_in_gaze_are_said_with_field_value_and_rule(

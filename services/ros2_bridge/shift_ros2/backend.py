@@ -11,8 +11,10 @@ from collections import Counter, deque
 from collections.abc import Awaitable, Callable
 from typing import Protocol
 
+import structlog
 from shift_schemas.errors import ShiftError
 
+log = structlog.get_logger()
 Answer = tuple[bool, str]
 """``success`` and ``message`` of the service."""
 TURN = 200
@@ -94,8 +96,11 @@ class Inbox:
             lost, self._lost = self._lost, Counter()
             self._awake = bool(self._items)
             again = self._awake
-        for _, handle in items:
-            handle()
+        for topic, handle in items:
+            try:
+                handle()
+            except Exception:  # ours; the bridge lives on, and the others of this turn are not lost
+                log.exception("an arrival failed", topic=topic)
         for topic, number in lost.items():
             self._overflowed(topic, number)
         if again:

@@ -59,7 +59,7 @@ class Diagnostics:
         for (topic, reason), count in self.dropped.items():
             dropped.setdefault(topic, {})[reason] = count
         content = {"service": "ros2_bridge", **more, "state": self.state, "received": dict(self.received)}
-        return json.dumps({**content, "dropped": dropped, "last": self._last}, ensure_ascii=False)
+        return json.dumps({**content, "dropped": dropped, "last": self._last})
 
 
 def shorten_detail(detail: str) -> str:

@@ -114,7 +114,18 @@ def _object(what: str, text: str) -> dict[str, Any]:
     data = parse_json(text)
     if not isinstance(data, dict):
         raise _refused(what, "data", data, "a JSON object")
+    if "\\u" in text and not _sayable(data):
+        raise _refused(what, "data", "", "text must be Unicode; half a surrogate pair is none")
     return data
+
+
+def _sayable(data: Any) -> bool:
+    """Whether what was escaped can be written again."""
+    try:
+        json.dumps(data, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _validated(what: str, kind: type[M], text: str) -> M:

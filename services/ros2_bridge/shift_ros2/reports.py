@@ -7,10 +7,12 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from typing import Any
 
+import structlog
 from shift_schemas.errors import ShiftError, Unavailable
 
 from shift_ros2.progress import Progress
 
+log = structlog.get_logger()
 Work = Callable[[], Awaitable[Any]]
 WAITING = 1_000
 PAUSE_S = 0.2
@@ -61,4 +63,8 @@ class Reports:
                 await asyncio.sleep(PAUSE_S)
             except ShiftError as e:
                 self._lost(topic, e)
+                return
+            except Exception:
+                log.exception("a message could not be handed on", topic=topic)
+                self._lost(topic, ShiftError("something went wrong inside the bridge"))
                 return

@@ -6,6 +6,7 @@ import asyncio
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 
+import structlog
 from shift_runtime.door import CommandDoor
 from shift_schemas.errors import MalformedMessage, ShiftError, Unavailable
 
@@ -14,6 +15,7 @@ from shift_ros2.mapping import GazeArrival
 from shift_ros2.progress import Progress
 from shift_ros2.settings import BridgeSettings
 
+log = structlog.get_logger()
 BACKLOG_CHUNK = 500
 """Chosen: samples of a chunk where they came faster than the monitor acknowledges."""
 Lost = Callable[[str, ShiftError, int], None]
@@ -101,6 +103,9 @@ class GazeSender:
             if isinstance(e, Unavailable) and not taken[0].numbered and source in self._next_seq:
                 self._next_seq[source] += 1  # whether it came in or not: where it did not, the gap is seen
             self._lost("gaze", e, samples)
+        except Exception:
+            log.exception("gaze could not be handed on", session=self._session)
+            self._lost("gaze", ShiftError("something went wrong inside the bridge"), samples)
 
     async def _hand_on(self, taken: list[GazeArrival]) -> None:
         await self._attach(self._session)
