@@ -14,6 +14,7 @@ import httpx
 import pytest
 from interactions import essence, expected, read_recording
 from mesh import LiveMesh, free_port, running_mesh
+from shift_cli.supervisor import STEADY_S
 from shift_runtime.rest_client import RestClient
 from shift_simulator.live import drive
 from shift_simulator.users import paper_user
@@ -209,3 +210,21 @@ def test_a_router_whose_endpoint_is_taken_says_so(tmp_path: Path) -> None:
     assert done.returncode != 0
     assert f"the router cannot listen on {endpoint}" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_service_that_ran_and_then_cannot_open_its_journal_is_tried_again(tmp_path: Path) -> None:
+    """Exit code 2 at the first start stops the mesh; later it is a trouble that may pass."""
+    with running_mesh(tmp_path) as mesh:
+        steady = time.monotonic() + STEADY_S
+        mesh.until(lambda: time.monotonic() > steady)
+        state = mesh.data / "state"
+        os.kill(mesh.pid_of("shift_learner"), signal.SIGSTOP)  # it does not come back between the next two steps
+        kept = [(path, path.rename(state / f"away-{path.name}")) for path in state.glob("learner.*")]
+        (state / "learner.sqlite").mkdir()
+        mesh.kill("shift_learner")
+        mesh.until(lambda: "ended with exit code 2" in mesh.log.read_text())
+        (state / "learner.sqlite").rmdir()
+        for path, away in kept:
+            away.rename(path)
+        mesh.wait_ready()
+        assert mesh.process.poll() is None

@@ -44,6 +44,8 @@ class Program:
     deaths: int = 0
     due: float = 0.0
     """When it is to be started again, on the monotonic clock."""
+    ran: bool = False
+    """It lived for a while once, so its settings do: what ends it now may pass (a full disk, say)."""
 
 
 def programs(demo: bool, router: bool) -> list[Program]:
@@ -94,7 +96,8 @@ class Supervisor:
                 self.tell(f"{signal.Signals(received.si_signo).name}: stopping")
                 return 0
             for program, status in self._dead():
-                if os.waitstatus_to_exitcode(status) == SETTINGS_WRONG:
+                program.ran = program.ran or time.monotonic() - program.started > STEADY_S
+                if os.waitstatus_to_exitcode(status) == SETTINGS_WRONG and not program.ran:
                     self.tell(f"the {program.name} cannot run with these settings; stopping")
                     return SETTINGS_WRONG
                 self._mourn(program, status)

@@ -82,7 +82,12 @@ class Journal:
             self._db.executescript(_TABLES)
         except (sqlite3.Error, OSError) as e:
             raise InvalidSettings(f"the journal {path} cannot be opened: {e}; set SHIFT_DATA to a folder for it") from e
-        self.heads: dict[str, int] = dict(self._db.execute("SELECT session, MAX(seq) FROM outbox GROUP BY session"))
+        self.heads: dict[str, int] = dict(
+            self._db.execute(  # one look-up a session: the rows of a long study are not all read
+                "SELECT session, (SELECT MAX(seq) FROM outbox WHERE outbox.session = state.session) AS head"
+                " FROM state WHERE head IS NOT NULL"
+            )
+        )
         self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
 
     # --- reading back ---
