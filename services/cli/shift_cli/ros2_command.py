@@ -30,7 +30,11 @@ def ros2(
     shift-mesh ros2 --ros-args -p session:=s1 -p create_session:=true     # begun here, if need be
     shift-mesh ros2 --backend rclpy --ros-args -r __ns:=/lab -r shift/gaze:=/tracker/gaze
     """
-    flags = {"--backend": backend, "--session": session, "--zenoh": zenoh, "--ros-router": ros_router}
-    given = [word for flag, value in flags.items() if value is not None for word in (flag, value)]
+    flags = {"backend": backend, "session": session, "zenoh": zenoh, "ros_router": ros_router}
+    given = []
+    for name, value in flags.items():  # the environment is read there, below what --ros-args says
+        source = context.get_parameter_source(name)
+        if value is not None and source is not None and source.name == "COMMANDLINE":
+            given += [f"--{name.replace('_', '-')}", value]
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, "-m", "shift_ros2", *given, *context.args])
