@@ -497,9 +497,7 @@ class Answer(Message):
 class Health(Message):
     """A worker's own answer, through its own loop."""
 
-    service: str
-    ready: bool
-    detail: str = ""
-    sessions: Count = 0
-    pid: Count = 0
-    version: str = ""
+    service: str = Field(description="The service that answers.")
+    ready: bool = Field(description="It has read every journal that it needs, and the disk takes its own.")
+    detail: str = Field(default="", description="What it waits for.")
+    sessions: Count = Field(default=0, description="Sessions in memory.")
