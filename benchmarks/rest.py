@@ -64,7 +64,8 @@ def _measure(hello: httpx.Client, shift: httpx.Client) -> None:
     result = {"success": True, "duration_s": 5.0}
     requests: dict[str, Callable[[int], httpx.Response]] = {
         "bare FastAPI hello": lambda n: hello.get("/"),
-        "GET observation (replica)": lambda n: shift.get(f"{path}/observation"),
+        "GET observation, just after a report": lambda n: shift.get(f"{path}/observation"),
+        "GET observation, nothing new": lambda n: shift.get(f"{path}/observation"),
         "POST gaze, 10 samples (one fsync)": lambda n: shift.post(f"{path}/gaze", json=_chunk(n)),
         "POST decisions (two services, fsyncs)": lambda n: shift.post(
             f"{path}/decisions", json={"task": "t", "decision_id": f"d{n}"}

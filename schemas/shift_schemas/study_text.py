@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import islice
@@ -26,6 +27,15 @@ RULE_LENGTH = 400
 """How much of a rule is said: rules name what is there, and that can be as long as what was sent."""
 
 
+class _Loader(yaml.SafeLoader):
+    """YAML 1.1's safe loader, and numbers as JSON writes them: 1e-05 has no point."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+(?:\.[0-9]*)?[eE][-+]?[0-9]+\Z"), list("-+0123456789")
+)
+
+
 def parse_study(text: str, name: str = "study") -> Study:
     """The study that ``text`` spells, YAML or JSON; ``name`` is the file's, for the message.
 
@@ -35,7 +45,7 @@ def parse_study(text: str, name: str = "study") -> Study:
         With one field error per mistake; the message gives ``file:line``.
     """
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = yaml.compose(text, Loader=_Loader)
     except (yaml.YAMLError, RecursionError) as e:
         mark = getattr(e, "problem_mark", None)
         where = f"{name}:{mark.line + 1}" if mark else name
@@ -56,7 +66,7 @@ def parse_study(text: str, name: str = "study") -> Study:
 
 def _constructed(text: str, name: str) -> Any:
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, Loader=_Loader)
     except (yaml.YAMLError, ValueError, RecursionError) as e:  # ValueError: the 99th of a month
         mark = getattr(e, "problem_mark", None)
         where = f"{name}:{mark.line + 1}" if mark else name

@@ -84,3 +84,8 @@ def test_any_object_is_a_study_or_refused_as_one(data: dict[str, object]) -> Non
         study_of({"study": "x"} | data)
     except InvalidStudy:
         return
+
+
+@pytest.mark.parametrize("number", ["1e-05", "1E-5", "1.0e-05", "0.00001"])
+def test_a_number_may_be_written_as_json_writes_it(number: str) -> None:
+    assert parse_study(f"study: s\nreward: {{decay: {number}}}\n").reward.decay == 1e-05

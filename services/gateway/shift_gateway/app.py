@@ -363,7 +363,7 @@ def _add_operations(app: FastAPI, gateway: Gateway) -> None:
     @app.get("/metrics", tags=["operations"])
     async def metrics() -> Response:
         """Prometheus metrics of all services."""
-        texts = await asyncio.gather(*(gateway.mesh.metrics(s) for s in SERVICES))
+        texts = await asyncio.gather(*(gateway.mesh.metrics(s) for s in (*SERVICES, "ros2_bridge")))
         text = gathered([gateway.metrics.text(), *(t for t in texts if t)])
         return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")
 

@@ -56,6 +56,9 @@ HINT_WAIT_S = 0.05
 """How long a waiting command trusts that a hint will come before its owner's outbox is pulled."""
 CHECK_EVERY_S = 1.0
 """How often a disk that refused is tried again; RELIABILITY.md, row 11, wants the alarm within as much."""
+HINT_AFTER_S = 0.002
+"""How long after an answer its facts are published. Measured on two cores: a service call over ROS 2 takes 1.4 times
+the sum of its parts that way, 2.2 times with the hints before the answer."""
 STREAM_LIMIT = 5_000
 """Chunks that may wait; more are dropped and counted."""
 
@@ -139,6 +142,7 @@ class Worker(Generic[S]):
         self._checking = False
         self._overload = 0
         self._tasks: set[asyncio.Task[None]] = set()
+        self._hints: list[tuple[OutboxRow, Fact]] = []
 
     # --- life ---
 
@@ -152,6 +156,7 @@ class Worker(Generic[S]):
             while not self._stopping:
                 await self._turn()
             await self.on_stop()
+            self._publish_hints()
         finally:
             pulling.cancel()
 
@@ -474,8 +479,7 @@ class Worker(Generic[S]):
         return bool(turn.batch.rows or turn.batch.states or turn.batch.answers or turn.batch.closed)
 
     def _tell(self, turn: _Turn) -> None:
-        for row, fact in turn.facts:
-            self.publish(row, fact)
+        """Answers first: a hint wakes every other service, and on few cores they would race the answer home."""
         for asked, answer in turn.answers:
             self.metrics.answered(asked.procedure, "repeat" if answer.repeat else "done")
             payload = encode(answer)
@@ -486,10 +490,25 @@ class Worker(Generic[S]):
             if not asked.requests:
                 self.metrics.dropped("refused")
             asked.refuse(error)
+        self._hint(turn.facts, later=any(asked.requests for asked, _ in turn.answers))
         for session in turn.ended:
             self.states.pop(session, None)
             self.reader.forget(session)
         self.after_turn()
+
+    def _hint(self, facts: list[tuple[OutboxRow, Fact]], later: bool) -> None:
+        """Publish committed facts in their order; those that go with an answer a little after it."""
+        waiting = bool(self._hints)
+        self._hints += facts
+        if later and not waiting:
+            asyncio.get_running_loop().call_later(HINT_AFTER_S, self._publish_hints)
+        elif not waiting:
+            self._publish_hints()
+
+    def _publish_hints(self) -> None:
+        hints, self._hints = self._hints, []
+        for row, fact in hints:
+            self.publish(row, fact)
 
     def after_turn(self) -> None:
         """A place for what a service does once a turn is committed."""
