@@ -237,6 +237,25 @@ def test_an_owner_that_is_not_there_is_no_answer_and_nothing_is_lost() -> None:
     run(test())
 
 
+def test_nobody_counts_as_read_before_the_recorder_since_no_session_is_known_before() -> None:
+    """Facts of a session that nobody told of are held back: an owner read that early is not read."""
+
+    async def test() -> None:
+        owner = Owner(MemoryBus(hub := Hub()))
+        learner = MemoryBus(hub)
+        page = OutboxPage(owner="learner", rows=[], heads={}, complete=True)
+        learner.serve(build_key(ServiceKey("learner", "outbox")), lambda request: request.reply(encode(page)))
+        reader = Reader(MemoryBus(hub), ("recorder", "learner"), {}, lambda read: None, lambda reason: None)
+        assert await reader.pull_all(("recorder", "learner")) == ("recorder",)
+        assert reader.synced == set()
+        owner.live()
+        assert await reader.pull("recorder")
+        assert await reader.pull("learner")
+        assert reader.synced == {"recorder", "learner"}
+
+    run(test())
+
+
 def test_what_is_asked_for_during_a_pull_gets_one_more_after_it() -> None:
     async def test() -> None:
         owner, reading = await read_up()

@@ -20,6 +20,8 @@ from shift_runtime.bus import Bus, Incoming
 
 PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
+FIRST_TRIES, FIRST_PAUSE_S = 20, 0.05
+"""How often the recorder is asked at the start before the others are read without it; chosen: a second."""
 REPLAY_MARK = b"replay:"
 """Before the sequence of what is replayed: tools that listen hear it, a reader passes over it."""
 
@@ -76,8 +78,10 @@ class Reader:
 
     async def run(self) -> None:
         """Pull every owner for ever, the recorder first: no session is known before it said so."""
-        if "recorder" in self.owners:
-            await self.pull("recorder")
+        for _ in range(FIRST_TRIES if "recorder" in self.owners else 0):
+            if await self.pull("recorder"):
+                break
+            await asyncio.sleep(FIRST_PAUSE_S)
         while True:
             await asyncio.gather(*(self.pull(owner) for owner in self.owners))
             await asyncio.sleep(PULL_EVERY_S)
@@ -152,6 +156,7 @@ class Reader:
                 return answered
 
     async def _pull(self, owner: str, session: str | None) -> bool:
+        knows_sessions = owner == "recorder" or "recorder" in self.synced or "recorder" not in self.owners
         past: dict[str, int] = {}
         """Heads of sessions that are done: an owner that has not closed them offers them from their start."""
         while True:
@@ -168,7 +173,7 @@ class Reader:
             if session is not None:
                 self.pages[f"{owner}/{session}"] = page
             if page.complete:
-                if session is None:
+                if session is None and knows_sessions:  # else a session's facts may have been held back
                     self.synced.add(owner)
                 return True
 
