@@ -381,6 +381,10 @@ class Command(Message):
         return self.model_dump_json(exclude={"need", "command_id"})
 
 
+START_ID, END_ID = "start", "end"
+"""Start and end have no id of their own: a session has one of each, and a repeat gets the first result."""
+
+
 class StartSession(Command):
     """Begin a session."""
 

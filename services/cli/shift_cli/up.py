@@ -6,7 +6,6 @@ import fcntl
 import http.client
 import os
 import socket
-import sys
 import time
 from pathlib import Path
 from typing import IO
@@ -105,9 +104,3 @@ def _check_free(host: str, port: int, what: str, flag: str) -> None:
             probe.bind((host, port))
     except OSError as e:
         raise InvalidSettings(f"{what} {host}:{port} cannot be used: {e.strerror}; choose another with {flag}") from e
-
-
-def fail(error: InvalidSettings) -> int:
-    """Say what is wrong with the settings; exit code 2."""
-    sys.stderr.write(f"shift-mesh: {error.detail}\n")
-    return 2

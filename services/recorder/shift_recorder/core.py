@@ -19,10 +19,6 @@ from shift_schemas.step import Step
 from shift_schemas.study import Study, fixed_changes
 from shift_schemas.study_text import patched, study_data, study_from_json, study_in_force, study_json, study_of
 
-START_ID = "start"
-END_ID = "end"
-"""Start and end have no id of their own: a session has one of each, and a repeat gets the first result."""
-
 
 class FinishSession(EndSession):
     """The second half of an end: the recording is finished. Its content is that of the end it completes."""

@@ -12,7 +12,18 @@ from dataclasses import replace
 from typing import Any
 
 from shift_schemas.errors import ShiftError
-from shift_schemas.messages import Config, Configure, EndSession, Fact, Mark, Marker, Session, StartSession
+from shift_schemas.messages import (
+    END_ID,
+    START_ID,
+    Config,
+    Configure,
+    EndSession,
+    Fact,
+    Mark,
+    Marker,
+    Session,
+    StartSession,
+)
 
 from shift_recorder.core import RecorderState, ended, step
 from shift_recorder.differences import Difference, Differs, Placed, compare, differ, is_missing
@@ -109,7 +120,7 @@ class Rerecord:
                 self.state = RecorderState(ended(state, now), state.config, state.original)
                 return derived
             case Session():
-                after = step(state, EndSession(command_id="end", session=fact.session), now)
+                after = step(state, EndSession(command_id=END_ID, session=fact.session), now)
             case Config():
                 patch = merge_patch_between(json.loads(state.config.study), json.loads(fact.study))
                 after = step(state, Configure(command_id="change", session=fact.session, patch=patch), now)
@@ -125,7 +136,7 @@ class Rerecord:
 
 def _start_of(start: Session, study: dict[str, Any]) -> StartSession:
     return StartSession(
-        command_id="start", session=start.session, participant=start.participant, study=study, seed=start.seed,
+        command_id=START_ID, session=start.session, participant=start.participant, study=study, seed=start.seed,
         condition=start.condition, replay_of=start.replay_of, software=start.software, revision=start.revision,
     )  # fmt: skip
 

@@ -28,11 +28,11 @@ from shift_runtime.settings import MeshSettings
 from shift_runtime.worker import Asked, Core, Worker, _Turn
 from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, Unavailable
 from shift_schemas.keys import OWNERS, READS, ROOT, FactKey, StreamKey, parse_key
-from shift_schemas.messages import Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
+from shift_schemas.messages import END_ID, Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
 from shift_schemas.study_text import study_from_json
 
 from shift_recorder import core
-from shift_recorder.core import END_ID, FinishSession, RecorderState
+from shift_recorder.core import FinishSession, RecorderState
 from shift_recorder.finishing import FinishedRecording, finish_recording
 from shift_recorder.front import attachments_of, metadata_of
 from shift_recorder.mcap_schemas import recorded_json, subject_schemas

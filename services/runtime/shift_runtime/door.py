@@ -13,6 +13,8 @@ from typing import Any
 from shift_schemas.bodies import DecisionBody, MarkerBody, OverrideBody, PerformanceBody, StartBody
 from shift_schemas.errors import Unavailable, UnknownThing
 from shift_schemas.messages import (
+    END_ID,
+    START_ID,
     Answer,
     Command,
     Configure,
@@ -32,7 +34,6 @@ from shift_runtime.replica import Replica, View
 
 READ_WAIT_S = 2.0
 """How long a read waits for what it must have in it, at least; a study's ``wait_s`` can make it longer."""
-START_ID, END_ID = "start", "end"
 
 
 def new_id(prefix: str) -> str:
