@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 import zenoh
 from runtime_fixtures import SOON_S, linked, until, until_asked
-from shift_runtime.bus import Bus, Incoming, Reply, Request
+from shift_runtime.bus import Bus, Incoming, Reply, Request, first_answer
 from shift_runtime.zenoh_bus import ZenohBus
 from shift_runtime.zenoh_config import zenoh_config
 from shift_schemas.errors import InvalidSettings
@@ -190,7 +190,8 @@ async def _asked(bus: Bus, silent: list[Request]) -> bool:
     return bool(silent)
 
 
-async def test_what_others_replied_counts_when_one_says_nothing(open_bus: OpenBus) -> None:
+async def half_silent(open_bus: OpenBus) -> Bus:
+    """A bus; of the two servers under ``half``, one replies ``here`` and the other says nothing."""
     one, other = await pair(open_bus)
     silent: list[Request] = []
     one.serve("half", silent.append)
@@ -202,7 +203,34 @@ async def test_what_others_replied_counts_when_one_says_nothing(open_bus: OpenBu
         return bool(replies and silent)
 
     await until_asked(both)
+    return one
+
+
+async def test_what_others_replied_counts_when_one_says_nothing(open_bus: OpenBus) -> None:
+    one = await half_silent(open_bus)
     assert await one.get("half", timeout_s=0.3) == [Reply(True, b"here")]
+
+
+async def test_a_request_can_end_with_the_reply_that_is_enough(open_bus: OpenBus) -> None:
+    """Nobody waits for a server that says nothing once another has said what was asked for."""
+    one = await half_silent(open_bus)
+    loop = asyncio.get_running_loop()
+    begun = loop.time()
+    assert await one.get("half", timeout_s=60.0, enough=lambda r: r.payload == b"here") == [Reply(True, b"here")]
+    assert loop.time() - begun < 30.0  # not a matter of speed: it does not wait for the time to be over
+
+
+async def test_the_first_answer_is_the_first_reply_that_can_be_read(open_bus: OpenBus) -> None:
+    one, other = await pair(open_bus)
+    one.serve("twice", lambda r: r.reply(b"a stranger's"))
+    other.serve("twice", lambda r: asyncio.get_running_loop().call_later(0.05, r.reply, b"7"))
+    await answered(one, "twice", 2)
+
+    def number(reply: Reply) -> int | None:
+        return int(reply.payload) if reply.payload.isdigit() else None
+
+    assert await first_answer(one, "twice", timeout_s=5.0, read=number) == 7
+    assert await first_answer(one, "nobody", timeout_s=5.0, read=number) is None
 
 
 async def test_beyond_the_limit_arrivals_are_dropped_and_counted(open_bus: OpenBus) -> None:

@@ -16,9 +16,9 @@ from itertools import count
 from typing import Any
 
 import zenoh
+from shift_runtime.zenoh_bus import direct
 from shift_runtime.zenoh_config import zenoh_config
 from shift_schemas.errors import InvalidSettings, MalformedMessage, Problem, ShiftError, shorten
-from zenoh.handlers import Callback
 
 from shift_ros2 import cdr, ros4hri
 from shift_ros2.backend import Handlers, Inbox
@@ -119,7 +119,7 @@ class NativeBackend:
             self._inbox.put(topic, lambda: self._take_text(topic, interface.type, key, payload, attachment))
 
         key = data_key(self._settings.domain, name, interface.type, "*")
-        self._declared.append(self._session.declare_subscriber(key, Callback(on_sample, indirect=False)))
+        self._declared.append(self._session.declare_subscriber(key, direct(on_sample)))
         self._token(self._entity("MS", interface))
 
     def _advertise(self, interface: Interface) -> None:
@@ -143,7 +143,7 @@ class NativeBackend:
                 query.drop()  # type: ignore[no-untyped-call]
 
         key = data_key(self._settings.domain, name, interface.type, "*")
-        queryable = self._session.declare_queryable(key, Callback(on_query, indirect=False), complete=True)
+        queryable = self._session.declare_queryable(key, direct(on_query), complete=True)
         self._declared.append(queryable)
         self._token(self._entity("SS", interface))
 
@@ -155,7 +155,7 @@ class NativeBackend:
             self._inbox.put(name, lambda: self._guarded(name, lambda: take(key, payload)))
 
         key = data_key(self._settings.domain, name, kind, "*")
-        self._declared.append(self._session.declare_subscriber(key, Callback(on_sample, indirect=False)))
+        self._declared.append(self._session.declare_subscriber(key, direct(on_sample)))
 
     def _entity(self, kind: Any, interface: Interface) -> str:
         settings = self._settings

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,10 @@ class Bus(Protocol):
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
         """Publish; never blocks, and drops rather than wait for a slow subscriber."""
 
-    async def get(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[Reply]:
-        """Ask; every reply that came within ``timeout_s``."""
+    async def get(
+        self, key: str, payload: bytes = b"", *, timeout_s: float, enough: Callable[[Reply], bool] | None = None
+    ) -> list[Reply]:
+        """Ask; every reply that came within ``timeout_s``, up to the first that is ``enough``."""
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
         """Hear what is published under ``key`` (``*`` is any one part); beyond ``limit`` waiting, it is dropped."""
@@ -78,3 +82,18 @@ class Bus(Protocol):
 
     async def close(self) -> None:
         """Take everything back and leave."""
+
+
+async def first_answer(
+    bus: Bus, key: str, payload: bytes = b"", *, timeout_s: float, read: Callable[[Reply], T | None]
+) -> T | None:
+    """Ask; what ``read`` makes of the first reply that it can make something of, without waiting for others."""
+    found: T | None = None
+
+    def enough(reply: Reply) -> bool:
+        nonlocal found
+        found = read(reply)
+        return found is not None
+
+    await bus.get(key, payload, timeout_s=timeout_s, enough=enough)
+    return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -68,7 +69,9 @@ class MemoryBus:
             if matches(expression, key):
                 handler(Incoming(key, payload, attachment))
 
-    async def get(self, key: str, payload: bytes = b"", *, timeout_s: float) -> list[Reply]:
+    async def get(
+        self, key: str, payload: bytes = b"", *, timeout_s: float, enough: Callable[[Reply], bool] | None = None
+    ) -> list[Reply]:
         """See :class:`~shift_runtime.bus.Bus`."""
         waiting = []
         for expression, handler in list(self._hub.servers):
@@ -76,10 +79,13 @@ class MemoryBus:
                 future: asyncio.Future[Reply] = asyncio.get_running_loop().create_future()
                 handler(_Request(key, payload, future))
                 waiting.append(future)
-        if not waiting:
-            return []
-        await asyncio.wait(waiting, timeout=timeout_s)
-        return [f.result() for f in waiting if f.done()]
+        replies: list[Reply] = []
+        with contextlib.suppress(TimeoutError):
+            for coming in asyncio.as_completed(waiting, timeout=timeout_s):
+                replies.append(await coming)
+                if enough is not None and enough(replies[-1]):
+                    break
+        return replies
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
         """See :class:`~shift_runtime.bus.Bus`."""

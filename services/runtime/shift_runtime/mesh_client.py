@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import asyncio
 
-from shift_schemas.codec import decode, encode
+from shift_schemas.codec import M, decode, encode
 from shift_schemas.errors import MalformedMessage, Problem, Unavailable
 from shift_schemas.keys import PROCEDURE_OWNER, STREAMS, CommandKey, ServiceKey, StreamKey, build_key
 from shift_schemas.messages import Answer, Command, GazeChunk, Health
 
-from shift_runtime.bus import Bus
+from shift_runtime.bus import Bus, Reply, first_answer
 
 ATTEMPT_S = 1.0
 """A request that is lost with a dying router hangs for its whole time; so each attempt is short."""
@@ -49,18 +49,14 @@ class MeshClient:
 
     async def health(self, service: str, timeout_s: float = 1.0) -> Health | None:
         """What the service's worker says of itself; none when it does not answer."""
-        for reply in await self.bus.get(build_key(ServiceKey(service, "health")), timeout_s=timeout_s):
-            if reply.ok:
-                try:
-                    return decode(Health, reply.payload)
-                except MalformedMessage:
-                    continue
-        return None
+        key = build_key(ServiceKey(service, "health"))
+        return await first_answer(self.bus, key, timeout_s=timeout_s, read=_health_of)
 
     async def metrics(self, service: str, timeout_s: float = 1.0) -> bytes:
         """The service's metrics; empty when it does not answer."""
-        replies = await self.bus.get(build_key(ServiceKey(service, "metrics")), timeout_s=timeout_s)
-        return next((r.payload for r in replies if r.ok), b"")
+        key = build_key(ServiceKey(service, "metrics"))
+        found = await first_answer(self.bus, key, timeout_s=timeout_s, read=lambda r: r.payload if r.ok else None)
+        return found or b""
 
     async def _ask(self, key: str, payload: bytes, owner: str, wait_s: float) -> Answer:
         loop = asyncio.get_running_loop()
@@ -69,18 +65,24 @@ class MeshClient:
             left = deadline - loop.time()
             if left <= 0:
                 raise Unavailable(f"the {owner} does not answer")
-            answer = await self._attempt(key, payload, min(left, ATTEMPT_S))
-            if answer is not None:
+            answer = await first_answer(self.bus, key, payload, timeout_s=min(left, ATTEMPT_S), read=_answer_of)
+            if isinstance(answer, Problem):
+                raise answer.error()
+            if isinstance(answer, Answer):
                 return answer
             await asyncio.sleep(PAUSE_S)
 
-    async def _attempt(self, key: str, payload: bytes, timeout_s: float) -> Answer | None:
-        for reply in await self.bus.get(key, payload, timeout_s=timeout_s):
-            try:
-                if reply.ok:
-                    return decode(Answer, reply.payload)
-                problem = decode(Problem, reply.payload)
-            except MalformedMessage:  # not one of ours: Zenoh says "Timeout" this way
-                continue
-            raise problem.error()
+
+def _answer_of(reply: Reply) -> Answer | Problem | None:
+    return _decoded(Answer, reply) if reply.ok else _decoded(Problem, reply)
+
+
+def _health_of(reply: Reply) -> Health | None:
+    return _decoded(Health, reply) if reply.ok else None
+
+
+def _decoded(kind: type[M], reply: Reply) -> M | None:
+    try:
+        return decode(kind, reply.payload)
+    except MalformedMessage:  # not one of ours: Zenoh says "Timeout" this way
         return None

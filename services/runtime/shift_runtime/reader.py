@@ -16,7 +16,7 @@ from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, build_key, parse_key
 from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxRow
 
-from shift_runtime.bus import Bus, Incoming
+from shift_runtime.bus import Bus, Incoming, Reply, first_answer
 
 PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
@@ -191,11 +191,11 @@ class Reader:
 
     async def _page(self, owner: str, query: OutboxQuery) -> OutboxPage | None:
         key = build_key(ServiceKey(owner, "outbox"))
-        for reply in await self.bus.get(key, encode(query), timeout_s=PULL_TIMEOUT_S):
-            if not reply.ok:
-                continue
-            try:
-                return decode(OutboxPage, reply.payload)
-            except MalformedMessage:
-                self.dropped("malformed")
-        return None
+        return await first_answer(self.bus, key, encode(query), timeout_s=PULL_TIMEOUT_S, read=self._page_of)
+
+    def _page_of(self, reply: Reply) -> OutboxPage | None:
+        try:
+            return decode(OutboxPage, reply.payload) if reply.ok else None
+        except MalformedMessage:
+            self.dropped("malformed")
+            return None
