@@ -7,6 +7,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ValidationError
 
 from shift_schemas.errors import MalformedMessage, malformed
+from shift_schemas.messages import Answer
 
 M = TypeVar("M", bound=BaseModel)
 VERSION = "v1"
@@ -20,6 +21,12 @@ def encoding_of(message: type[BaseModel]) -> str:
 def encode(message: BaseModel) -> bytes:
     """The message as JSON."""
     return message.model_dump_json().encode()
+
+
+def encode_answer(owner: str, seq: int, repeat: bool, result: str) -> bytes:
+    """An :class:`Answer` around a ``result`` that is JSON already."""
+    around = Answer(owner=owner, seq=seq, repeat=repeat, result={}).model_dump_json()
+    return f"{around.removesuffix('{}}')}{result}}}".encode()
 
 
 def decode(kind: type[M], payload: bytes | str) -> M:

@@ -16,11 +16,11 @@ S = TypeVar("S")
 
 @dataclass(frozen=True)
 class Step(Generic[S]):
-    """The next state, the facts that follow from the message, and a command's answer."""
+    """The next state, the facts that follow, and a command's answer: one of them or an object."""
 
     state: S
     facts: tuple[Fact, ...] = ()
-    result: dict[str, Any] = field(default_factory=dict)
+    result: Fact | dict[str, Any] = field(default_factory=dict)
 
 
 class NotYet(Exception):
@@ -44,8 +44,13 @@ def covers(seen: Seen, need: Seen) -> bool:
         and seen.config >= need.config
         and seen.observation >= need.observation
         and seen.policy >= need.policy
-        and all(seen.gaze.get(source, -1) >= seq for source, seq in need.gaze.items())
+        and covers_gaze(seen, need)
     )
+
+
+def covers_gaze(seen: Seen, need: Seen) -> bool:
+    """Whether all chunks of gaze were ``seen`` that are ``need``-ed."""
+    return all(seen.gaze.get(source, -1) >= seq for source, seq in need.gaze.items())
 
 
 def merged_seen(a: Seen, b: Seen) -> Seen:

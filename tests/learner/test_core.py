@@ -139,7 +139,7 @@ def test_a_report_gives_performance_transition_and_policy() -> None:
         0.0,
         0.0,
     )
-    assert step.result == performance.model_dump(mode="json")
+    assert step.result is performance
     assert transition.state == "engaged_observer"
     assert tuple(transition.action.values()) == ACTIONS[2]
     assert (transition.reward, transition.propensity, transition.versions) == (0.0, 1 / 6, decision(1).versions)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from runtime_fixtures import row
-from shift_runtime.journal import Batch, Journal, StoredAnswer, digest_of
+from shift_runtime.journal import LOG_PAGES, PAGE_BYTES, Batch, Journal, StoredAnswer, digest_of
 from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery
 
@@ -49,7 +49,7 @@ def seen(page: OutboxPage) -> list[tuple[str, int]]:
 
 def test_what_a_commit_held_is_there_after_reopening(path: Path) -> None:
     journal = opened(path)
-    answer = StoredAnswer(digest_of("asked"), {"session": "s1"})
+    answer = StoredAnswer(digest_of("asked"), '{"session": "s1"}')
     journal.commit(
         Batch({"s1": "state"}, {("s1", "decider"): 7}, [row(1), row(2)], {START: answer}, {"s1"}),
     )
@@ -62,6 +62,13 @@ def test_what_a_commit_held_is_there_after_reopening(path: Path) -> None:
         assert there.answer(("s1", "start_session", "other")) is None
 
 
+def test_the_log_has_its_full_length_from_the_start_and_the_file_stays_small(path: Path) -> None:
+    journal = filled(path, s1=1)
+    assert path.with_name(f"{path.name}-wal").stat().st_size >= LOG_PAGES * PAGE_BYTES
+    journal.close()
+    assert path.stat().st_size < 20 * PAGE_BYTES
+
+
 def test_cursors_of_closed_sessions_are_forgotten(path: Path) -> None:
     journal = opened(path)
     journal.commit(Batch(states={"s1": "", "s2": ""}, cursors={("s1", "decider"): 7, ("s2", "decider"): 3}))
@@ -72,7 +79,7 @@ def test_cursors_of_closed_sessions_are_forgotten(path: Path) -> None:
 
 def test_a_commit_that_breaks_in_its_middle_leaves_nothing_behind(path: Path) -> None:
     journal = filled(path, s1=2)
-    answer = StoredAnswer(digest_of("asked"), {})
+    answer = StoredAnswer(digest_of("asked"), "{}")
     with pytest.raises(Unavailable, match=r"the monitor cannot write its journal monitor\.sqlite"):
         journal.commit(Batch({"s1": "later"}, {("s1", "decider"): 9}, [row(3), row(2)], {START: answer}, {"s1"}))
     for there in (journal, opened(path)):
@@ -87,10 +94,21 @@ def test_a_commit_that_breaks_in_its_middle_leaves_nothing_behind(path: Path) ->
 
 def test_the_first_answer_of_a_command_stays(path: Path) -> None:
     journal = opened(path)
-    journal.commit(Batch(answers={START: StoredAnswer("first", {"n": 1})}))
+    journal.commit(Batch(answers={START: StoredAnswer("first", '{"n":1}')}))
     with pytest.raises(Unavailable):
-        journal.commit(Batch(answers={START: StoredAnswer("second", {"n": 2})}))
-    assert journal.answer(START) == StoredAnswer("first", {"n": 1})
+        journal.commit(Batch(answers={START: StoredAnswer("second", '{"n":2}')}))
+    assert journal.answer(START) == StoredAnswer("first", '{"n":1}')
+
+
+def test_an_answer_that_is_a_fact_is_kept_once(path: Path) -> None:
+    journal = opened(path)
+    fact = row(2).model_copy(update={"payload": '{"n":2,"reason":"told once"}'})
+    answer = StoredAnswer("digest", fact.payload, seq=2)
+    journal.commit(Batch(rows=[row(1), fact], answers={START: answer}))
+    for there in (journal, opened(path)):
+        assert there.answer(START) == answer
+    (text,) = sqlite3.connect(path).execute("SELECT result FROM answer").fetchone()
+    assert text == "2"
 
 
 def test_an_empty_batch_is_false_and_any_content_makes_it_true() -> None:
@@ -98,7 +116,7 @@ def test_an_empty_batch_is_false_and_any_content_makes_it_true() -> None:
     assert Batch(states={"s1": ""})
     assert Batch(cursors={("s1", "monitor"): 1})
     assert Batch(rows=[row(1)])
-    assert Batch(answers={START: StoredAnswer("", {})})
+    assert Batch(answers={START: StoredAnswer("", "{}")})
     assert Batch(closed={"s1"})
 
 
@@ -175,7 +193,7 @@ n = journal.heads.get("s1", 0)
 while True:
     rows = [row(n + i) for i in (1, 2, 3)]
     n += 3
-    answer = {{("s1", "mark", f"m{{n}}"): StoredAnswer("", {{"n": n}})}}
+    answer = {{("s1", "mark", f"m{{n}}"): StoredAnswer("", "{{}}")}}
     journal.commit(Batch({{"s1": str(n)}}, {{("s1", "decider"): n}}, rows, answer))
     sys.stdout.write(f"{{n}}\\n")
     sys.stdout.flush()

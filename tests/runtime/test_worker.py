@@ -61,6 +61,18 @@ async def test_a_repeat_gets_the_first_result_and_changes_nothing(live: Rig) -> 
 
 
 @RUNNING
+async def test_an_answer_that_is_a_fact_is_repeated_as_it_was_after_a_crash(live: Rig) -> None:
+    await live.decide("d1")
+    first = await live.decide("d2", "fact")
+    assert first.result["reason"] == "decision d2"
+    await live.crash()
+    live.start()
+    repeat = await live.decide("d2", "fact")
+    assert (repeat.repeat, repeat.result) == (True, first.result)
+    assert live.outbox() == [(1, "decision d1"), (2, "decision d2")]
+
+
+@RUNNING
 async def test_a_repeat_gets_the_first_result_after_a_crash(live: Rig) -> None:
     first = await live.decide("d1")
     await live.crash()

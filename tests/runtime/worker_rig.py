@@ -75,6 +75,9 @@ def step(state: Notes | None, message: Any, now: Stamp, late: bool = False) -> S
         case Decide() if message.task.startswith("after-") and not late:
             if state.fixations < int(message.task.removeprefix("after-")):
                 raise NotYet(("monitor",), WAIT_S)
+        case Decide(task="fact"):
+            done = noted(state, f"decision {message.command_id}", message.command_id, now)
+            return replace(done, result=done.facts[0])
     assert isinstance(message, Decide)
     done = noted(state, f"decision {message.command_id}", message.command_id, now)
     return replace(done, result={"n": len(done.state.notes), "fixations": state.fixations, "late": late})

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
-from shift_schemas.codec import decode, encode, encoding_of
+from shift_schemas.codec import decode, encode, encode_answer, encoding_of
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.messages import COMMANDS, FACTS, Answer, Configure, Decide, Decision, GazeChunk, OutboxQuery
 from strategies import json_values
@@ -25,6 +25,13 @@ def test_encodings_name_the_message_and_its_version() -> None:
 def test_a_message_survives_the_wire() -> None:
     message = decode(Decide, DECIDE)
     assert decode(Decide, encode(message)) == message
+
+
+@pytest.mark.parametrize("result", [{}, {"n": 7, "reason": "größer als {}"}, {"of": {"a": [{}]}}])
+@pytest.mark.parametrize("repeat", [True, False])
+def test_an_answer_around_a_result_that_is_json_already_is_that_answer(result: dict[str, object], repeat: bool) -> None:
+    payload = encode_answer("decider", 3, repeat, json.dumps(result))
+    assert decode(Answer, payload) == Answer(owner="decider", seq=3, repeat=repeat, result=result)
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "-1e999", "true", "false", '"0.5"', "[]"])

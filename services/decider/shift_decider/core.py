@@ -33,7 +33,7 @@ from shift_schemas.messages import (
 from shift_schemas.randomness import pick, uniform
 from shift_schemas.scoring import Reduction, reduce, view
 from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet, Step, covers, merged_seen
+from shift_schemas.step import NotYet, Step, covers_gaze
 from shift_schemas.study import Study
 from shift_schemas.study_text import study_from_json
 from shift_schemas.words import PolicySource, Triple
@@ -163,13 +163,19 @@ class Lacks(NamedTuple):
 def lacks(state: DeciderState, need: Seen) -> Lacks:
     """What is not there yet for the next decision, given what the door had answered."""
     version = state.config.version if state.config else 0
-    whole = merged_seen(need, Seen(decision=state.n, config=version))
-    of_policy = Seen(decision=state.n, performance=whole.performance, config=whole.config)
-    of_observation = whole.model_copy(update={"observation": 0, "policy": 0})
+
+    def lacking(seen: Seen) -> bool:
+        return (
+            seen.decision < max(need.decision, state.n)
+            or seen.config < max(need.config, version)
+            or seen.performance < need.performance
+        )
+
+    observation, policy = state.observation, state.policy
     return Lacks(
         config=version < max(1, need.config),
-        observation=state.observation is None or not covers(state.observation.seen, of_observation),
-        policy=state.policy is None or state.policy.for_n != state.n + 1 or not covers(state.policy.seen, of_policy),
+        observation=observation is None or lacking(observation.seen) or not covers_gaze(observation.seen, need),
+        policy=policy is None or policy.for_n != state.n + 1 or lacking(policy.seen),
     )
 
 
@@ -177,7 +183,7 @@ def _decide(state: DeciderState, command: Decide, now: Stamp, late: bool) -> Ste
     decision = decided(state, command.task, command.command_id, command.need, now, late)
     overrides = {task: o for task, o in state.overrides.items() if task != command.task}
     after = replace(state, n=decision.n, overrides=overrides)
-    return Step(after, (decision,), decision.model_dump(mode="json"))
+    return Step(after, (decision,), decision)
 
 
 def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: Stamp, late: bool) -> Decision:
@@ -254,11 +260,7 @@ def _override(state: DeciderState, command: SetOverride, now: Stamp, late: bool)
         session=state.session, stamp=now, seen=_seen(state), override_id=command.command_id, task=command.task,
         strategy={s: command.strategy[s] for s in study.scoring.strategies}, reason=command.reason,
     )  # fmt: skip
-    return Step(
-        replace(state, overrides={**state.overrides, command.task: fact}),
-        (fact,),
-        fact.model_dump(mode="json"),
-    )
+    return Step(replace(state, overrides={**state.overrides, command.task: fact}), (fact,), fact)
 
 
 def check_strategy(study: Study, strategy: Strategy) -> None:

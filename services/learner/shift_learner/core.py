@@ -176,7 +176,7 @@ def _reported(state: LearnerState, command: ReportPerformance, now: Stamp, late:
         after, transition = _updated(after, command.command_id, now)
         facts = (performance, transition)
     done = _with_policy(after, facts, now)
-    return replace(done, result=performance.model_dump(mode="json"))
+    return replace(done, result=performance)
 
 
 def _ended(state: LearnerState, now: Stamp) -> Step[LearnerState]:

@@ -158,7 +158,7 @@ def check_changeable(before: Study, after: Study) -> None:
 def _mark(state: RecorderState, command: Mark, now: Stamp) -> Step[RecorderState]:
     _check_live(state)
     fact = Marker(session=command.session, stamp=now, marker_id=command.command_id, text=command.text)
-    return Step(state, (fact,), fact.model_dump(mode="json"))
+    return Step(state, (fact,), fact)
 
 
 def _check_live(state: RecorderState) -> None:

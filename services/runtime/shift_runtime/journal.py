@@ -8,13 +8,12 @@ moment: what was acknowledged is here, and what is here is applied once.
 from __future__ import annotations
 
 import hashlib
-import json
+import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
@@ -30,6 +29,8 @@ CREATE TABLE IF NOT EXISTS answer (
     PRIMARY KEY (session, procedure, command_id)) WITHOUT ROWID;
 """
 
+LOG_PAGES, PAGE_BYTES = 1000, 4096
+"""SQLite's own: after so many pages in the log there is a checkpoint, and it begins at its start again."""
 AnswerKey = tuple[str, str, str]
 """Session, procedure, command id."""
 
@@ -39,7 +40,10 @@ class StoredAnswer:
     """The first result of a command, and a digest of what was asked."""
 
     digest: str
-    result: dict[str, Any]
+    result: str
+    """As JSON."""
+    seq: int = 0
+    """Where the result is a fact in the outbox: its number there. It is not written twice."""
 
 
 @dataclass
@@ -80,6 +84,7 @@ class Journal:
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
             self._db.executescript(_TABLES)
+            self._grow_log()
         except (sqlite3.Error, OSError) as e:
             raise InvalidSettings(f"the journal {path} cannot be opened: {e}; set SHIFT_DATA to a folder for it") from e
         self.heads: dict[str, int] = dict(
@@ -89,6 +94,28 @@ class Journal:
             )
         )
         self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
+        self._answered: dict[str, set[tuple[str, str]]] = {}
+        """Procedures and ids of the commands that were carried out, of the sessions where somebody asked."""
+
+    def _grow_log(self) -> None:
+        """Give the write-ahead log its full length now: a commit that overwrites syncs faster than one that appends.
+
+        Measured: 330 us a commit, 420 us without. It is as long as SQLite lets it become before a checkpoint; pages of
+        a transaction that is taken back spill into it and count for nothing.
+        """
+        try:
+            self._db.execute("PRAGMA cache_size = 10")
+            self._db.execute("BEGIN IMMEDIATE")
+            self._db.execute("CREATE TABLE room (data BLOB)")
+            self._db.execute("INSERT INTO room VALUES (zeroblob(?))", (LOG_PAGES * PAGE_BYTES,))
+            with open(f"{self.path}-wal", "rb") as log:
+                os.fsync(log.fileno())
+        except (sqlite3.Error, OSError):  # no room for it: then it grows as it must
+            pass
+        finally:
+            if self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            self._db.execute("PRAGMA cache_size = -2000")
 
     # --- reading back ---
 
@@ -108,10 +135,23 @@ class Journal:
 
     def answer(self, key: AnswerKey) -> StoredAnswer | None:
         """The first result of a command, if it was carried out."""
-        row = self._db.execute(
+        if key[1:] not in self._commands(key[0]):
+            return None
+        digest, text = self._db.execute(
             "SELECT digest, result FROM answer WHERE session = ? AND procedure = ? AND command_id = ?", key
         ).fetchone()
-        return StoredAnswer(row[0], json.loads(row[1])) if row else None
+        if not text.isdigit():
+            return StoredAnswer(digest, text)
+        (payload,) = self._db.execute(
+            "SELECT payload FROM outbox WHERE session = ? AND seq = ?", (key[0], int(text))
+        ).fetchone()
+        return StoredAnswer(digest, payload, int(text))
+
+    def _commands(self, session: str) -> set[tuple[str, str]]:
+        if session not in self._answered:
+            rows = self._db.execute("SELECT procedure, command_id FROM answer WHERE session = ?", (session,))
+            self._answered[session] = set(rows)
+        return self._answered[session]
 
     def closed(self, session: str) -> bool:
         """Whether the session has ended and its recording is finished."""
@@ -131,7 +171,11 @@ class Journal:
             self._write(batch)
         for row in batch.rows:
             self.heads[row.session] = row.seq
+        for session, procedure, command_id in batch.answers:
+            self._commands(session).add((procedure, command_id))
         self._closed |= batch.closed
+        for session in batch.closed:
+            self._answered.pop(session, None)
 
     def check(self) -> None:
         """Find out whether the disk takes commits, by one that changes nothing of what is kept.
@@ -157,22 +201,20 @@ class Journal:
             raise Unavailable(f"the {self.owner} cannot write its journal {self.path.name}: {e}") from e
 
     def _write(self, batch: Batch) -> None:
-        db = self._db
-        db.executemany(
-            "INSERT INTO state (session, data) VALUES (?, ?) ON CONFLICT DO UPDATE SET data = excluded.data",
-            batch.states.items(),
-        )
-        db.executemany(
-            "INSERT OR REPLACE INTO cursor VALUES (?, ?, ?)", [(s, o, n) for (s, o), n in batch.cursors.items()]
-        )
-        db.executemany(
-            "INSERT INTO outbox VALUES (?, ?, ?, ?)", [(r.session, r.seq, r.subject, r.payload) for r in batch.rows]
-        )
-        db.executemany(
-            "INSERT INTO answer VALUES (?, ?, ?, ?, ?)",
-            [(*key, a.digest, json.dumps(a.result)) for key, a in batch.answers.items()],
-        )
-        db.executemany("UPDATE state SET closed = 1 WHERE session = ?", [(s,) for s in batch.closed])
+        rows: dict[str, list[tuple[str | int, ...]]] = {
+            "INSERT INTO state (session, data) VALUES (?, ?) ON CONFLICT DO UPDATE SET data = excluded.data": [
+                *batch.states.items()
+            ],
+            "INSERT OR REPLACE INTO cursor VALUES (?, ?, ?)": [(*key, n) for key, n in batch.cursors.items()],
+            "INSERT INTO outbox VALUES (?, ?, ?, ?)": [(r.session, r.seq, r.subject, r.payload) for r in batch.rows],
+            "INSERT INTO answer VALUES (?, ?, ?, ?, ?)": [
+                (*key, a.digest, str(a.seq or a.result)) for key, a in batch.answers.items()
+            ],
+            "UPDATE state SET closed = 1 WHERE session = ?": [(s,) for s in batch.closed],
+        }
+        for statement, values in rows.items():
+            if values:
+                self._db.executemany(statement, values)
 
     # --- the outbox ---
 
