@@ -21,7 +21,7 @@ REQUIREMENTS: dict[str, tuple[str, ...]] = {
     "rclpy": (
         "ros-rclpy[fastrtps]==9.1.2", "ros-std-msgs", "ros-std-srvs",
         "eclipse-zenoh>=1.10,<2", "pydantic>=2.12,<3", "pydantic-settings>=2.10,<3", "PyYAML>=6.0.2",
-        "structlog>=25", "prometheus-client>=0.22",
+        "structlog>=25", "prometheus-client>=0.22", "uvloop>=0.22",
     ),
 }  # fmt: skip
 PACKAGES = ("schemas", "services/runtime", "services/ros2_bridge")

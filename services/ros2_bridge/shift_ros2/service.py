@@ -14,6 +14,7 @@ from shift_runtime.door import CommandDoor
 from shift_runtime.logs import configure_logs
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
+from shift_runtime.process import run_loop
 from shift_runtime.replica import Replica
 from shift_runtime.zenoh_bus import ZenohBus
 from shift_schemas.codec import encode
@@ -35,7 +36,7 @@ def run_bridge(line: Sequence[str]) -> None:
     try:
         settings = bridge_settings(line)
         configure_logs(SERVICE, settings)
-        asyncio.run(serve(settings))
+        run_loop(serve(settings))
     except ShiftError as e:
         sys.stderr.write(f"shift_ros2: {e.detail}\n")
         sys.exit(2)
