@@ -43,11 +43,14 @@ class LiveMesh:
 
     def pid_of(self, package: str) -> int:
         """The process of a service, found by its package in its command line."""
-        found = [
-            int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and self._is(entry, package)
-        ]
+        found = self._pids(package)
         assert len(found) == 1, f"{package}: {found}"
         return found[0]
+
+    def _pids(self, package: str) -> list[int]:
+        return [
+            int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and self._is(entry, package)
+        ]
 
     def _is(self, entry: Path, package: str) -> bool:
         try:
@@ -58,7 +61,10 @@ class LiveMesh:
         return package in line and parent == self.process.pid
 
     def kill(self, package: str) -> int:
-        """kill -9 of a service; the pid that it had."""
+        """kill -9 of a service, once it is back from the kill before; the pid that it had."""
+        end = time.monotonic() + READY_WITHIN_S
+        while not self._pids(package) and time.monotonic() < end:
+            time.sleep(0.01)
         pid = self.pid_of(package)
         os.kill(pid, signal.SIGKILL)
         return pid

@@ -22,6 +22,7 @@ COLUMNS = ("t", "x", "y", "valid", "aoi")
 UNNUMBERED = 0
 M = TypeVar("M", bound=BaseModel)
 _ID: TypeAdapter[str] = TypeAdapter(Id)
+_PLAIN = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
 
 class GazeArrival(NamedTuple):
@@ -100,7 +101,7 @@ def text_of_fact(fact: Fact, payload: str) -> str:
 
 def text_of_answer(answer: dict[str, Any]) -> str:
     """A command's result as the service's ``message``."""
-    return json.dumps(answer, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return _PLAIN.encode(answer)
 
 
 def text_of_error(error: ShiftError) -> str:
