@@ -1,10 +1,11 @@
 """What the bridge costs: a service call through it against its parts, measured in one run, turn by turn.
 
 ``call <= 1.5 * (bare + get + fsync)``: *call* is ``/shift/next_strategy`` through bridge and decider, *bare* the
-same client's call of a Trigger server that answers at once (the same backend, no mesh behind it), *get* one
-Zenoh request between two processes, *fsync* 4 KB to the disk of the journals. Medians, microseconds.
+same client's call of a Trigger server of its own kind that answers at once (pyzeros, rclpy), *get* one
+Zenoh request between two processes, none of our code on either side, *fsync* 4 KB to the disk of the journals.
+Medians, microseconds.
 
-    python benchmarks/ros2_round_trip.py [--calls 200] [--backend native|rclpy] [--check]
+    python benchmarks/ros2_round_trip.py [--calls 200] [--backend native|rclpy] [--pause SECONDS] [--check]
 
 For ``rclpy`` the client and the bridge run in the environment that tests/ros2/peers.py makes.
 """
@@ -22,11 +23,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ros_rig import Bridge
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "tests" / "e2e"), str(ROOT / "tests" / "ros2")]
-PACE_S = 0.03
-"""Between calls: a robot's are seconds apart, and what a decision leads to must be over."""
+PAUSE_S = 0.03
+"""Between measurements: a robot's calls are seconds apart, and what a decision leads to must be over."""
 LIMIT = 1.5
 
 
@@ -35,28 +40,28 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--calls", type=int, default=200)
     parser.add_argument("--backend", default="native")
+    parser.add_argument("--pause", type=float, default=PAUSE_S)
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args()
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        figures = measure(folder, options.backend, options.calls, stack)
+        figures = measure(folder, options.backend, options.calls, options.pause, stack)
     print(json.dumps(figures))
     sys.exit(options.check and figures["ratio"] > LIMIT)
 
 
-def measure(folder: Path, backend: str, calls: int, stack: ExitStack) -> dict[str, float]:
+def measure(folder: Path, backend: str, calls: int, pause_s: float, stack: ExitStack) -> dict[str, float]:
     """The medians, in microseconds, and their ratio."""
     from mesh import running_mesh
     from ros_rig import Bridge, rpc_peer
 
     mesh = stack.enter_context(running_mesh(folder / "mesh"))
     bridge = stack.enter_context(Bridge(mesh.zenoh, folder, backend, task="grasp"))
-    bare = stack.enter_context(bare_server(bridge))
+    stack.enter_context(bare_server(bridge))
     peer = stack.enter_context(rpc_peer(bridge, folder))
     for name in ("/shift/next_strategy", "/bare/next_strategy"):
         peer.ask("service", name)
     get = stack.enter_context(getter(mesh.zenoh))
-    del bare
     kinds: dict[str, Callable[[], float]] = {
         "call": lambda: float(peer.ask("timed_call", "/shift/next_strategy")),
         "bare": lambda: float(peer.ask("timed_call", "/bare/next_strategy")),
@@ -69,7 +74,7 @@ def measure(folder: Path, backend: str, calls: int, stack: ExitStack) -> dict[st
             took = one()
             if turn >= 20:
                 found[kind].append(took * 1e6)
-            time.sleep(PACE_S)
+            time.sleep(pause_s)
     medians = {kind: round(statistics.median(times), 1) for kind, times in found.items()}
     medians["p90_call"] = round(statistics.quantiles(found["call"], n=10)[8], 1)
     medians["ratio"] = round(medians["call"] / (medians["bare"] + medians["get"] + medians["fsync"]), 3)
@@ -77,43 +82,42 @@ def measure(folder: Path, backend: str, calls: int, stack: ExitStack) -> dict[st
 
 
 @contextmanager
-def bare_server(bridge: object) -> Iterator[None]:
-    """A Trigger server of the same backend with nothing behind it."""
-    from ros_rig import Bridge
+def bare_server(bridge: Bridge) -> Iterator[None]:
+    """A Trigger server of the client's kind with nothing behind it."""
+    from peers import python_of, work_folder
 
-    assert isinstance(bridge, Bridge)
-    with bridge.beside([str(ROOT / "tests" / "ros2" / "bare_server.py")]):
+    kind = "pyzeros" if bridge.backend == "native" else "rclpy"
+    command = [python_of(kind), str(ROOT / "tests" / "ros2" / f"bare_{kind}.py"), bridge.router]
+    server = subprocess.Popen(command, env=bridge.env, cwd=work_folder())
+    try:
         yield
+    finally:
+        server.kill()
+        server.wait()
 
 
 @contextmanager
-def getter(zenoh: str) -> Iterator[Callable[[], float]]:
-    """One Zenoh request of this process to another, over the mesh's bus."""
-    import asyncio
+def getter(router: str) -> Iterator[Callable[[], float]]:
+    """One Zenoh request of this process to another, linked as the mesh's services are."""
+    from shift_runtime.zenoh_config import zenoh_config
+    from zenoh import open as open_session
 
-    from shift_runtime.zenoh_bus import ZenohBus
-
-    server = subprocess.Popen([sys.executable, str(ROOT / "tests" / "ros2" / "get_server.py"), zenoh])
-    loop = asyncio.new_event_loop()
-    bus = loop.run_until_complete(ZenohBus.open(zenoh, "tcp/127.0.0.1:0"))
+    server = subprocess.Popen([sys.executable, str(ROOT / "tests" / "ros2" / "get_server.py"), router])
+    session = open_session(zenoh_config("peer", connect=router, listen="tcp/127.0.0.1:0"))
 
     def get() -> float:
-        async def timed() -> float:
-            while True:
-                started = time.perf_counter()
-                replies = await bus.get("bench/get", b"x" * 200, timeout_s=5.0)
-                took = time.perf_counter() - started
-                if replies:
-                    return took
-                await asyncio.sleep(0.01)  # it is not there yet
-
-        return loop.run_until_complete(timed())
+        while True:
+            started = time.perf_counter()
+            replies = list(session.get("bench/get", payload=b"x" * 200, timeout=5.0))
+            took = time.perf_counter() - started
+            if replies:
+                return took
+            time.sleep(0.01)  # it is not there yet
 
     try:
         yield get
     finally:
-        loop.run_until_complete(bus.close())
-        loop.close()
+        session.close()
         server.terminate()
         server.wait()
 

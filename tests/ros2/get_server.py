@@ -1,15 +1,18 @@
-"""Answers one key on the mesh's bus at once: what one Zenoh request costs by itself."""
+"""Answers one key at once, in Zenoh's own thread: what one Zenoh request costs by itself."""
 
-import asyncio
 import sys
+import time
 
-from shift_runtime.zenoh_bus import ZenohBus
-
-
-async def main():
-    bus = await ZenohBus.open(sys.argv[1], "tcp/127.0.0.1:0")
-    bus.serve("bench/get", lambda request: request.reply(b"x" * 1000))
-    await asyncio.sleep(3600)
+import zenoh
+from shift_runtime.zenoh_config import zenoh_config
+from zenoh.handlers import Callback
 
 
-asyncio.run(main())
+def answer(query):
+    query.reply(query.key_expr, b"x" * 1000)
+    query.drop()
+
+
+session = zenoh.open(zenoh_config("peer", connect=sys.argv[1], listen="tcp/127.0.0.1:0"))
+session.declare_queryable("bench/get", Callback(answer, indirect=False))
+time.sleep(3600)

@@ -1,14 +1,13 @@
 """pyzeros as a peer: an independent implementation of rmw_zenoh."""
 
 import asyncio
-import json
 import sys
 import threading
 
 import pyzeros
-import zenoh
 from peer_base import PeerBase, drive
 from pyzeros.sub import RawSub
+from pyzeros_session import open_session
 from ros2_pyterfaces.cydr.std_msgs.msg import String
 from ros2_pyterfaces.cydr.std_srvs.srv import Trigger
 
@@ -16,15 +15,7 @@ from ros2_pyterfaces.cydr.std_srvs.srv import Trigger
 class Peer(PeerBase):
     def __init__(self, router):
         super().__init__()
-        config = zenoh.Config()
-        entries = {
-            "mode": "peer", "connect/endpoints": [router], "listen/endpoints": ["tcp/localhost:0"],
-            "scouting/multicast/enabled": False, "timestamping/enabled": True,
-            "connect/retry": {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5},
-        }  # fmt: skip
-        for key, value in entries.items():
-            config.insert_json5(key, json.dumps(value))
-        self.session = zenoh.open(config)
+        self.session = open_session(router)
         self.loop = asyncio.new_event_loop()
         threading.Thread(target=self.loop.run_forever, daemon=True).start()
         self.node = pyzeros.Node("pyzeros_robot", session=self.session)

@@ -98,16 +98,6 @@ class Bridge:
             self.process.terminate()
         return self.process.wait(20)
 
-    @contextmanager
-    def beside(self, command: list[str]) -> Iterator[None]:
-        """A Python program beside the bridge: same interpreter, environment and command line."""
-        process = subprocess.Popen([self.python, *command, *self.line], env=self.env)
-        try:
-            yield
-        finally:
-            process.kill()
-            process.wait(20)
-
 
 class Peer:
     """A peer process, driven by lines."""
