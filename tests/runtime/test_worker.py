@@ -29,7 +29,7 @@ async def live(tmp_path: Path) -> Any:
     rig.recorder.put_out(session(), config())
     rig.start()
     await rig.ready()
-    await until(lambda: rig.notes() == () and rig.journal.state("s1"))
+    await until(lambda: rig.config() == 1)
     yield rig
     if not rig.running.done():
         await rig.stop()
@@ -272,6 +272,82 @@ async def test_a_session_that_ended_is_closed_and_read_no_more(live: Rig) -> Non
     live.start()
     await live.ready()
     assert live.worker.reader.done == {"s1"}
+
+
+# --- commits that can wait ---
+
+
+@RUNNING
+async def test_what_puts_nothing_out_is_committed_with_the_next_that_does(
+    live: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+    await live.decide("d1")
+    before = live.journal.commits
+    for version in (2, 3, 4):
+        live.recorder.put_out(config(version=version))
+        await until(lambda version=version: live.config() == version)  # type: ignore[misc]
+    assert live.journal.commits == before
+    assert live.committed().config == 1
+    await live.decide("d2")
+    assert live.journal.commits == before + 1
+    assert live.committed() == Notes("s1", 4, ("decision d1", "decision d2"))
+    assert live.journal.cursors()["s1", "recorder"] == 5
+
+
+@RUNNING
+async def test_what_puts_nothing_out_is_committed_soon_and_only_once(
+    live: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await live.decide("d1")
+    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 0.02)
+    before = live.journal.commits
+    live.recorder.put_out(config(version=2))
+    await until(lambda: live.committed().config == 2)
+    await asyncio.sleep(0.1)
+    assert live.journal.commits == before + 1
+
+
+@RUNNING
+async def test_what_was_read_and_not_committed_is_read_again_after_a_crash(
+    live: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+    await live.decide("d1")
+    live.recorder.put_out(config(version=2))
+    await until(lambda: live.config() == 2)
+    await live.crash()
+    live.start()
+    assert live.committed().config == 1
+    await until(lambda: live.config() == 2)
+    await live.decide("d2")
+    assert live.committed() == Notes("s1", 2, ("decision d1", "decision d2"))
+
+
+@RUNNING
+async def test_a_refused_commit_takes_back_what_waited_for_it_as_well(
+    live: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+    await live.decide("d1")
+    live.recorder.put_out(config(version=2))
+    await until(lambda: live.config() == 2)
+    live.journal.full = True
+    with pytest.raises(Unavailable, match="the disk is full"):
+        await live.decide("d2")
+    assert live.config() == 1
+    live.journal.full = False
+    await until(lambda: live.config() == 2)
+    await live.decide("d2")
+    assert live.committed() == Notes("s1", 2, ("decision d1", "decision d2"))
+
+
+@RUNNING
+async def test_a_repeat_s_answer_needs_no_commit(live: Rig) -> None:
+    await live.decide("d1")
+    before = live.journal.commits
+    assert (await live.decide("d1")).repeat
+    assert live.journal.commits == before
 
 
 # --- a disk that refuses ---

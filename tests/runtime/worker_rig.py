@@ -110,8 +110,8 @@ def session(name: str = "s1", state: Any = "live") -> Session:
     )
 
 
-def config(name: str = "s1") -> Config:
-    return Config(session=name, stamp=Stamp.of(1), version=1, study="{}")
+def config(name: str = "s1", version: int = 1) -> Config:
+    return Config(session=name, stamp=Stamp.of(1), version=version, study="{}")
 
 
 def fixation(n: int, name: str = "s1") -> Fixation:
@@ -157,13 +157,15 @@ class Owner:
 
 
 class FullDisk(Journal):
-    """A journal whose disk can be full."""
+    """A journal whose disk can be full, and that counts its commits."""
 
     full = False
+    commits = 0
 
     def commit(self, batch: Batch) -> None:
         if self.full:
             raise Unavailable("the decider cannot write its journal: the disk is full")
+        self.commits += 1
         super().commit(batch)
 
     def check(self) -> None:
@@ -245,7 +247,16 @@ class Rig:
         rows = self.journal.page(OutboxQuery(only=[name], limit=10_000), {}).rows
         return [(row.seq, json.loads(row.payload)["reason"]) for row in rows]
 
+    def committed(self, name: str = "s1") -> Notes:
+        """The committed state."""
+        text = self.journal.state(name)
+        return load(text) if text else Notes(name)
+
     def notes(self, name: str = "s1") -> tuple[str, ...]:
         """The notes of the committed state."""
-        text = self.journal.state(name)
-        return load(text).notes if text else ()
+        return self.committed(name).notes
+
+    def config(self) -> int:
+        """The version of the configuration that the worker has read, committed or not."""
+        state = self.worker.states.get("s1")
+        return state.config if state else 0
