@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from shift_schemas.errors import MalformedMessage, shorten
 from shift_schemas.ids import ID_RULE, is_id
@@ -67,6 +68,8 @@ SERVICES: tuple[str, ...] = (
     "simulator",
 )
 DOORS: tuple[str, ...] = ("outbox", "health", "metrics", "alive")
+KEYS = 1024
+"""So many keys are remembered with their texts: each message has one, and a session has some twenty."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,7 @@ class ServiceKey:
 Key = FactKey | StreamKey | CommandKey | ServiceKey
 
 
+@lru_cache(maxsize=KEYS)
 def build_key(key: Key) -> str:
     """The key's text. Raises :class:`MalformedMessage` for a session that is no id or an unknown word."""
     match key:
@@ -117,6 +121,7 @@ def build_key(key: Key) -> str:
             return f"{ROOT}/@service/{_word(service, SERVICES)}/{_word(door, DOORS)}"
 
 
+@lru_cache(maxsize=KEYS)
 def parse_key(text: str) -> Key:
     """The key that ``text`` spells. Raises :class:`MalformedMessage` for anything else."""
     parts = text.split("/")

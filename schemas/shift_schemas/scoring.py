@@ -6,10 +6,12 @@ not with the decider because learners take the suggestion as their prior, and no
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 from shift_schemas.messages import TripleView
 from shift_schemas.study import ScoringSettings
+from shift_schemas.study_text import study_from_json
 from shift_schemas.words import TRIPLES, Triple
 
 MARGIN = 1e-9
@@ -45,6 +47,13 @@ def reduce(settings: ScoringSettings, triple: Triple) -> Reduction:
     for name, strategy in settings.strategies.items():
         action = action * len(strategy.levels) + rank(found[name], strategy.thresholds)
     return Reduction(found, action, settings.states[action])
+
+
+@lru_cache(maxsize=64)
+def reductions(study: str) -> dict[Triple, Reduction]:
+    """What the scoring system makes of each of the 30 triples; the study in force as ``config`` facts carry it."""
+    settings = study_from_json(study).scoring
+    return {triple: reduce(settings, triple) for triple in TRIPLES}
 
 
 def suggestions(settings: ScoringSettings) -> tuple[int, ...]:

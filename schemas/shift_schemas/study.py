@@ -266,6 +266,11 @@ class ScoringSettings(_Part):
         return tuple(product(*(s.levels for s in self.strategies.values())))
 
     @cached_property
+    def choices(self) -> tuple[dict[str, str], ...]:
+        """Every action as it is said on the wire."""
+        return tuple(self.strategy(action) for action in self.actions)
+
+    @cached_property
     def states(self) -> tuple[str, ...]:
         """The cognitive states, one per action and in the actions' order: each *is* its action."""
         return tuple(cognitive_state_name(action) for action in self.actions)

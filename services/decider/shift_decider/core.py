@@ -31,7 +31,7 @@ from shift_schemas.messages import (
     Versions,
 )
 from shift_schemas.randomness import pick, uniform
-from shift_schemas.scoring import Reduction, reduce, view
+from shift_schemas.scoring import Reduction, reductions, view
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import NotYet, Step, covers_gaze
 from shift_schemas.study import Study
@@ -113,14 +113,14 @@ def _estimated(state: DeciderState, now: Stamp) -> Step[DeciderState]:
     facts = []
     for task in tasks:
         triple = triple_of(state.observation, task)
-        found = reduce(study.scoring, triple)
+        found = reductions(state.config.study)[triple]
         if known.get(task) != (found.scores, found.cognitive_state):
             known[task] = (found.scores, found.cognitive_state)
             facts.append(
                 Estimate(
                     session=state.session, stamp=now, seen=_seen(state), task=task, observation=view(triple),
                     scores=found.scores, cognitive_state=found.cognitive_state,
-                    suggested=study.scoring.strategy(study.scoring.actions[found.action]),
+                    suggested=study.scoring.choices[found.action],
                 )
             )  # fmt: skip
     return Step(replace(state, estimates=known), tuple(facts))
@@ -198,14 +198,14 @@ def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: S
     if state.observation is None or state.config is None:
         raise Unavailable("the monitor has put out no observation of this session yet")
     triple = triple_of(state.observation, task)
-    found = reduce(study.scoring, triple)
+    found = reductions(state.config.study)[triple]
     choice = _choose(state, study, task, triple, found, missing)
-    strategies = [study.scoring.strategy(a) for a in study.scoring.actions]
+    choices = study.scoring.choices
     override = state.overrides.get(task)
     return Decision(
         session=state.session, stamp=now, seen=_seen(state), decision_id=decision_id, task=task, n=state.n + 1,
-        strategy=strategies[choice.action], observation=view(triple), scores=found.scores,
-        cognitive_state=found.cognitive_state, suggested=strategies[found.action], actions=strategies,
+        strategy=choices[choice.action], observation=view(triple), scores=found.scores,
+        cognitive_state=found.cognitive_state, suggested=choices[found.action], actions=list(choices),
         probabilities=choice.probabilities, propensity=choice.propensity, explored=choice.explored,
         policy_source=choice.source, stale=missing.observation, state=choice.state, seed=state.seed,
         versions=Versions(

@@ -231,7 +231,7 @@ def _updated(state: LearnerState, decision_id: str, now: Stamp) -> tuple[Learner
     transition = Transition(
         session=state.session, stamp=now, seen=_seen(state), decision_id=decision_id, task=known.task,
         state=state_names(learner, context)[row],
-        action=context.study.scoring.strategy(context.study.scoring.actions[known.taken.action]),
+        action=context.study.scoring.choices[known.taken.action],
         reward=gained, propensity=known.taken.propensity, versions=known.versions,
         value=learner.row(context, memory, row).values[known.taken.action],
     )  # fmt: skip
@@ -254,7 +254,7 @@ def _with_policy(state: LearnerState, facts: tuple[Fact, ...], now: Stamp) -> St
     policy = Policy(
         session=after.session, stamp=now, seen=_seen(after), version=after.version,
         learner=context.study.learner.name, for_n=after.decisions + 1,
-        actions=[context.study.scoring.strategy(a) for a in context.study.scoring.actions], states=rows,
+        actions=list(context.study.scoring.choices), states=rows,
         epsilon=learner.epsilon(context, after.memory), cumulative_reward=after.cumulative_reward,
     )  # fmt: skip
     return Step(after, (*facts, policy))

@@ -148,7 +148,6 @@ class CommandDoor:
         """Wait until what these owners answered through this door has been read back."""
         session = view.fact.session
         for owner in owners:
-            if not await self.replica.wait(
-                session, (owner,), partial(self.replica.has_read, session, owner), READ_WAIT_S
-            ):
+            there = partial(self.replica.has_read, session, owner)
+            if not there() and not await self.replica.wait(session, (owner,), there, READ_WAIT_S):
                 raise Unavailable(f"the {owner} does not answer")

@@ -24,7 +24,6 @@ from shift_schemas.messages import (
     Seen,
     Session,
 )
-from shift_schemas.step import merged_seen
 from shift_schemas.study import Study
 from shift_schemas.study_text import study_from_json
 
@@ -66,13 +65,13 @@ class View:
     @property
     def need(self) -> Seen:
         """What an answer must have in it: what this door answered, and what it has read."""
-        read = Seen(
-            gaze=self.observation.seen.gaze if self.observation else {},
-            decision=self.n,
-            performance=self.performances,
-            config=self.config.version if self.config else 1,
+        answered, read = self.answered, self.observation.seen.gaze if self.observation else {}
+        return Seen(
+            gaze={s: max(n, read.get(s, n)) for s, n in (read | answered.gaze).items()},
+            decision=max(answered.decision, self.n),
+            performance=max(answered.performance, self.performances),
+            config=max(answered.config, self.config.version if self.config else 1),
         )
-        return merged_seen(self.answered, read)
 
 
 class Replica:
