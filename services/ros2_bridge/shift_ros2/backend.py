@@ -8,11 +8,13 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import Counter, deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
 from typing import Protocol
 
 import structlog
-from shift_schemas.errors import ShiftError
+from shift_schemas.errors import ShiftError, Unavailable
+
+from shift_ros2.mapping import text_of_error
 
 log = structlog.get_logger()
 Answer = tuple[bool, str]
@@ -35,6 +37,27 @@ class Backend(Protocol):
 
     async def close(self) -> None:
         """Leave the graph."""
+
+
+async def answer_of(handlers: Handlers, request_id: str | None) -> Answer:
+    """What the bridge answers; that it stops, where it does so before it knows."""
+    try:
+        return await handlers.on_request(request_id)
+    except asyncio.CancelledError:
+        return away()
+
+
+def away() -> Answer:
+    """The answer to a request that nobody has time for."""
+    return False, text_of_error(Unavailable("the bridge is busy or stopping; ask again"))
+
+
+async def stopped(tasks: Collection[asyncio.Task[None]]) -> None:
+    """Cancel them, and wait until they have said so."""
+    for task in tasks:
+        task.cancel()
+    if tasks:
+        await asyncio.wait(tasks)
 
 
 class Handlers(Protocol):

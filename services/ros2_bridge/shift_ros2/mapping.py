@@ -10,6 +10,7 @@ import json
 from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
+from pydantic_core import to_json
 from shift_schemas.bodies import PerformanceBody
 from shift_schemas.errors import FieldError, MalformedMessage, Problem, ShiftError, TooLarge, malformed, shorten
 from shift_schemas.ids import Id
@@ -22,7 +23,6 @@ COLUMNS = ("t", "x", "y", "valid", "aoi")
 UNNUMBERED = 0
 M = TypeVar("M", bound=BaseModel)
 _ID: TypeAdapter[str] = TypeAdapter(Id)
-_PLAIN = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
 
 class GazeArrival(NamedTuple):
@@ -101,7 +101,7 @@ def text_of_fact(fact: Fact, payload: str) -> str:
 
 def text_of_answer(answer: dict[str, Any]) -> str:
     """A command's result as the service's ``message``."""
-    return _PLAIN.encode(answer)
+    return to_json(answer).decode()
 
 
 def text_of_error(error: ShiftError) -> str:

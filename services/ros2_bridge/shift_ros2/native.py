@@ -21,7 +21,7 @@ from shift_runtime.zenoh_config import zenoh_config
 from shift_schemas.errors import InvalidSettings, MalformedMessage, Problem, ShiftError, shorten
 
 from shift_ros2 import cdr, ros4hri
-from shift_ros2.backend import Handlers, Inbox
+from shift_ros2.backend import Handlers, Inbox, answer_of, stopped
 from shift_ros2.interfaces import INTERFACES, Interface
 from shift_ros2.ros4hri import ENGAGEMENT, ENGAGEMENT_LEVEL, IDS_LIST, TRACKED
 from shift_ros2.settings import BridgeSettings
@@ -86,8 +86,7 @@ class NativeBackend:
 
     async def close(self) -> None:
         """See :class:`~shift_ros2.backend.Backend`."""
-        for task in list(self._answering):
-            task.cancel()
+        await stopped(self._answering.copy())
         self._publishers.clear()
         for thing in reversed(self._declared):
             thing.undeclare()
@@ -193,7 +192,7 @@ class NativeBackend:
 
     async def _answer(self, query: zenoh.Query, attachment: Attachment) -> None:
         try:
-            success, message = await self._handlers.on_request(attachment.name())
+            success, message = await answer_of(self._handlers, attachment.name())
             reply = Attachment(attachment.sequence, time.time_ns(), attachment.gid).encode()
             payload = cdr.encode_trigger_response(success, message)
             query.reply(query.key_expr, payload, encoding=ENCODING, attachment=reply)

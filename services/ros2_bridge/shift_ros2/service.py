@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import structlog
@@ -45,8 +45,7 @@ def run_bridge(line: Sequence[str]) -> None:
 async def serve(settings: BridgeSettings) -> None:
     """The bridge on both its sides, until a signal."""
     stop = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, stop.set)
+    _on_signal(stop.set)
     bus = await ZenohBus.open(settings.zenoh, settings.listen)
     metrics = Metrics(SERVICE)
     replica = Replica(bus, metrics.dropped)
@@ -55,6 +54,7 @@ async def serve(settings: BridgeSettings) -> None:
     pulling = asyncio.create_task(replica.reader.run())
     try:
         bridge.backend = await open_backend(settings, bridge)
+        _on_signal(stop.set)  # rclpy's executor takes the signals for itself
         _show(bus, bridge, metrics)
         log.info(
             "started", node=settings.node, namespace=settings.namespace, session=bridge.session,
@@ -86,6 +86,11 @@ async def open_backend(settings: BridgeSettings, bridge: Bridge) -> Backend:
     from shift_ros2.native import NativeBackend
 
     return await NativeBackend.open(settings, bridge)
+
+
+def _on_signal(stop: Callable[[], None]) -> None:
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, stop)
 
 
 def _show(bus: ZenohBus, bridge: Bridge, metrics: Metrics) -> None:
