@@ -51,15 +51,3 @@ def covers(seen: Seen, need: Seen) -> bool:
 def covers_gaze(seen: Seen, need: Seen) -> bool:
     """Whether all chunks of gaze were ``seen`` that are ``need``-ed."""
     return all(seen.gaze.get(source, -1) >= seq for source, seq in need.gaze.items())
-
-
-def merged_seen(a: Seen, b: Seen) -> Seen:
-    """The larger of both, field by field."""
-    return Seen(
-        gaze={s: max(a.gaze.get(s, 0), b.gaze.get(s, 0)) for s in (*a.gaze, *b.gaze)},
-        decision=max(a.decision, b.decision),
-        performance=max(a.performance, b.performance),
-        config=max(a.config, b.config),
-        observation=max(a.observation, b.observation),
-        policy=max(a.policy, b.policy),
-    )

@@ -227,7 +227,8 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
     async def decide(session: str, request: Request) -> Response:
         """The strategy to use now, and why."""
         await gateway.replica.view(check_id("session", session))
-        return _created(await gateway.door.decide(session, await body(request, bodies.DecisionBody)))
+        asked = await body(request, bodies.DecisionBody)
+        return _created(await gateway.door.decide(session, asked.task, asked.decision_id))
 
     @app.post(
         "/v1/sessions/{session}/performance",

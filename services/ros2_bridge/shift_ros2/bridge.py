@@ -15,7 +15,7 @@ import structlog
 from shift_runtime.clock import Clock
 from shift_runtime.door import READ_WAIT_S, CommandDoor
 from shift_runtime.metrics import Metrics
-from shift_schemas.bodies import DecisionBody, MarkerBody, StartBody
+from shift_schemas.bodies import MarkerBody, StartBody
 from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import Decision, Fact
 
@@ -151,7 +151,7 @@ class Bridge:
         if (sender := self._senders.get(session)) is not None and not sender.quiet:
             await sender.passed(GAZE_WAIT_S)
         await self._reports.passed(READ_WAIT_S)
-        answer, repeat = await self.door.decide(session, DecisionBody(task=task, decision_id=request_id))
+        answer, repeat = await self.door.decide(session, task, request_id)
         text = mapping.text_of_answer(answer)
         if not repeat:
             self._put_out_first(session, answer["decision_id"], text)

@@ -10,7 +10,7 @@ import secrets
 from functools import partial
 from typing import Any
 
-from shift_schemas.bodies import DecisionBody, MarkerBody, OverrideBody, PerformanceBody, StartBody
+from shift_schemas.bodies import MarkerBody, OverrideBody, PerformanceBody, StartBody
 from shift_schemas.errors import Unavailable, UnknownThing
 from shift_schemas.messages import (
     END_ID,
@@ -23,11 +23,9 @@ from shift_schemas.messages import (
     GazeChunk,
     Mark,
     ReportPerformance,
-    Seen,
     SetOverride,
     StartSession,
 )
-from shift_schemas.step import merged_seen
 
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.replica import Replica, View
@@ -57,23 +55,23 @@ class CommandDoor:
         )  # fmt: skip
         answer = await self.mesh.command(command)
         await self.replica.view(session)
-        self._remember(session, answer, Seen(config=1))
+        self._remember(session, answer, config=1)
         return answer.result, answer.repeat
 
     async def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Hand gaze to the monitor; acknowledged once it is in the journal."""
         await self.replica.view(session)
         answer = await self.mesh.gaze(session, chunk)
-        self._remember(session, answer, Seen(gaze={chunk.source: chunk.seq}))
+        self._remember(session, answer)
+        self._remember_gaze(session, chunk)
         return {"accepted": answer.result["accepted"]}
 
-    async def decide(self, session: str, body: DecisionBody) -> tuple[dict[str, Any], bool]:
+    async def decide(self, session: str, task: str, decision_id: str | None = None) -> tuple[dict[str, Any], bool]:
         """The next decision."""
         view = await self.replica.view(session)
-        command_id = body.decision_id or new_id("d-")
-        command = Decide(command_id=command_id, session=session, task=body.task, need=view.need)
+        command = Decide(command_id=decision_id or new_id("d-"), session=session, task=task, need=view.need)
         answer = await self.mesh.command(command, wait_s=await self._wait_s(view))
-        self._remember(session, answer, Seen(decision=answer.result["n"]))
+        self._remember(session, answer, decision=answer.result["n"])
         return answer.result, answer.repeat
 
     async def report(self, session: str, body: PerformanceBody) -> tuple[dict[str, Any], bool]:
@@ -86,7 +84,7 @@ class CommandDoor:
             comprehension=body.comprehension, enabledness=body.enabledness,
         )  # fmt: skip
         answer = await self.mesh.command(command, wait_s=READ_WAIT_S)
-        self._remember(session, answer, Seen(performance=answer.result["n"]))
+        self._remember(session, answer, performance=answer.result["n"])
         result = dict(answer.result)
         for dimension in ("comprehension", "enabledness"):
             result[dimension] = result[dimension]["value"]
@@ -112,26 +110,32 @@ class CommandDoor:
         """Change the study in force."""
         await self.replica.view(session)
         answer = await self.mesh.command(Configure(command_id=new_id("c-"), session=session, patch=patch))
-        self._remember(session, answer, Seen(config=answer.result["version"]))
+        self._remember(session, answer, config=answer.result["version"])
         return answer.result
 
     async def end(self, session: str) -> dict[str, Any]:
         """End the session; answered once its recording is finished."""
         await self.replica.view(session)
         answer = await self.mesh.command(EndSession(command_id=END_ID, session=session), wait_s=10.0)
-        self._remember(session, answer, Seen())
+        self._remember(session, answer)
         return answer.result
 
     async def _plain(self, session: str, command: Command, wait_s: float = 0.0) -> tuple[dict[str, Any], bool]:
         answer = await self.mesh.command(command, wait_s)
-        self._remember(session, answer, Seen())
+        self._remember(session, answer)
         return answer.result, answer.repeat
 
-    def _remember(self, session: str, answer: Answer, seen: Seen) -> None:
+    def _remember(self, session: str, answer: Answer, **counts: int) -> None:
         view = self.replica.views.get(session)
         if view is not None:
-            view.answered = merged_seen(view.answered, seen)
+            for count, number in counts.items():
+                view.answered[count] = max(view.answered[count], number)
             view.sequences[answer.owner] = max(view.sequences.get(answer.owner, 0), answer.seq)
+
+    def _remember_gaze(self, session: str, chunk: GazeChunk) -> None:
+        view = self.replica.views.get(session)
+        if view is not None:
+            view.answered_gaze[chunk.source] = max(view.answered_gaze.get(chunk.source, 0), chunk.seq)
 
     async def _wait_s(self, view: View) -> float:
         await self._read(view, ("recorder",))

@@ -48,8 +48,9 @@ class View:
     overrides: dict[str, Override] = field(default_factory=dict)
     n: int = 0
     counts: Counter[str] = field(default_factory=Counter)
-    answered: Seen = field(default_factory=Seen)
-    """What this door has answered: it is in everything that it answers afterwards."""
+    answered: Counter[str] = field(default_factory=Counter)
+    """What this door has answered, as :class:`Seen` counts it: it is in everything that it answers afterwards."""
+    answered_gaze: dict[str, int] = field(default_factory=dict)
     sequences: dict[str, int] = field(default_factory=dict)
     """Per owner, the sequence that its last answer named."""
     listeners: list[Listener] = field(default_factory=list)
@@ -67,10 +68,10 @@ class View:
         """What an answer must have in it: what this door answered, and what it has read."""
         answered, read = self.answered, self.observation.seen.gaze if self.observation else {}
         return Seen(
-            gaze={s: max(n, read.get(s, n)) for s, n in (read | answered.gaze).items()},
-            decision=max(answered.decision, self.n),
-            performance=max(answered.performance, self.performances),
-            config=max(answered.config, self.config.version if self.config else 1),
+            gaze={s: max(n, read.get(s, n)) for s, n in (read | self.answered_gaze).items()},
+            decision=max(answered["decision"], self.n),
+            performance=max(answered["performance"], self.performances),
+            config=max(answered["config"], self.config.version if self.config else 1),
         )
 
 
