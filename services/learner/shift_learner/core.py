@@ -140,17 +140,21 @@ def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[Learne
         action=decision.actions.index(decision.strategy),
         propensity=decision.propensity,
     )
-    previous = next((i for i, o in state.open.items() if i in state.rewards and o.taken == state.last), None)
-    opened = {i: replace(o, following=taken) if o.taken == state.last else o for i, o in state.open.items()}
+    opened = {**state.open, decision.decision_id: Open(decision.task, taken, decision.versions)}
+    previous = next(reversed(state.open), None)  # the newest that is open; the last decision may be no more
+    if previous is not None and state.open[previous].taken == state.last:
+        opened[previous] = replace(state.open[previous], following=taken)
+    else:
+        previous = None
     after = replace(
         state,
         memory=learner.decided(context, state.memory, taken),
-        open={**opened, decision.decision_id: Open(decision.task, taken, decision.versions)},
+        open=opened,
         last=taken,
         decisions=decision.n,
     )
     facts: tuple[Fact, ...] = ()
-    if previous is not None:
+    if previous in state.rewards:
         after, transition = _updated(after, previous, now)
         facts = (transition,)
     return _with_policy(after, facts, now)
