@@ -277,16 +277,25 @@ async def test_a_session_that_ended_is_closed_and_read_no_more(live: Rig) -> Non
 # --- commits that can wait ---
 
 
-@RUNNING
-async def test_what_puts_nothing_out_is_committed_with_the_next_that_does(
-    live: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What can wait for a commit waits for good."""
     monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+
+
+async def read_configuration(rig: Rig, version: int) -> None:
+    """One more thing is read that puts nothing out."""
+    rig.recorder.put_out(config(version=version))
+    await until(lambda: rig.config() == version)
+
+
+@RUNNING
+@pytest.mark.usefixtures("patient")
+async def test_what_puts_nothing_out_is_committed_with_the_next_that_does(live: Rig) -> None:
     await live.decide("d1")
     before = live.journal.commits
     for version in (2, 3, 4):
-        live.recorder.put_out(config(version=version))
-        await until(lambda version=version: live.config() == version)  # type: ignore[misc]
+        await read_configuration(live, version)
     assert live.journal.commits == before
     assert live.committed().config == 1
     await live.decide("d2")
@@ -302,20 +311,17 @@ async def test_what_puts_nothing_out_is_committed_soon_and_only_once(
     await live.decide("d1")
     monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 0.02)
     before = live.journal.commits
-    live.recorder.put_out(config(version=2))
+    await read_configuration(live, 2)
     await until(lambda: live.committed().config == 2)
     await asyncio.sleep(0.1)
     assert live.journal.commits == before + 1
 
 
 @RUNNING
-async def test_what_was_read_and_not_committed_is_read_again_after_a_crash(
-    live: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+@pytest.mark.usefixtures("patient")
+async def test_what_was_read_and_not_committed_is_read_again_after_a_crash(live: Rig) -> None:
     await live.decide("d1")
-    live.recorder.put_out(config(version=2))
-    await until(lambda: live.config() == 2)
+    await read_configuration(live, 2)
     await live.crash()
     live.start()
     assert live.committed().config == 1
@@ -325,13 +331,10 @@ async def test_what_was_read_and_not_committed_is_read_again_after_a_crash(
 
 
 @RUNNING
-async def test_a_refused_commit_takes_back_what_waited_for_it_as_well(
-    live: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+@pytest.mark.usefixtures("patient")
+async def test_a_refused_commit_takes_back_what_waited_for_it_as_well(live: Rig) -> None:
     await live.decide("d1")
-    live.recorder.put_out(config(version=2))
-    await until(lambda: live.config() == 2)
+    await read_configuration(live, 2)
     live.journal.full = True
     with pytest.raises(Unavailable, match="the disk is full"):
         await live.decide("d2")
@@ -356,6 +359,7 @@ async def test_a_repeat_s_answer_needs_no_commit(live: Rig) -> None:
 @RUNNING
 async def test_a_refused_commit_undoes_its_turn_and_the_repeat_is_carried_out_once(live: Rig) -> None:
     await live.decide("d1")
+    await until(lambda: live.published)  # its hint, which comes a little after the answer
     live.journal.full = True
     live.published.clear()
     for name in ("d2", "d3"):
