@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import Counter, deque
-from collections.abc import Awaitable, Callable, Collection
+from collections.abc import Callable, Collection
 from typing import Protocol
 
 import structlog
@@ -128,6 +128,3 @@ class Inbox:
             self._overflowed(topic, number)
         if again:
             self._loop.call_soon(self._turn)
-
-
-Opener = Callable[[Handlers], Awaitable[Backend]]

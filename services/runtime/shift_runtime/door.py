@@ -60,10 +60,10 @@ class CommandDoor:
 
     async def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Hand gaze to the monitor; acknowledged once it is in the journal."""
-        await self.replica.view(session)
+        view = await self.replica.view(session)
         answer = await self.mesh.gaze(session, chunk)
         self._remember(session, answer)
-        self._remember_gaze(session, chunk)
+        view.answered_gaze[chunk.source] = max(view.answered_gaze.get(chunk.source, 0), chunk.seq)
         return {"accepted": answer.result["accepted"]}
 
     async def decide(self, session: str, task: str, decision_id: str | None = None) -> tuple[dict[str, Any], bool]:
@@ -131,11 +131,6 @@ class CommandDoor:
             for count, number in counts.items():
                 view.answered[count] = max(view.answered[count], number)
             view.sequences[answer.owner] = max(view.sequences.get(answer.owner, 0), answer.seq)
-
-    def _remember_gaze(self, session: str, chunk: GazeChunk) -> None:
-        view = self.replica.views.get(session)
-        if view is not None:
-            view.answered_gaze[chunk.source] = max(view.answered_gaze.get(chunk.source, 0), chunk.seq)
 
     async def _wait_s(self, view: View) -> float:
         await self._read(view, ("recorder",))
