@@ -37,6 +37,7 @@ class PerformanceBody(Message):
     decision_id: Id = Field(description="The decision that it was done after.")
     comprehension: Result
     enabledness: Result
+    corrects: bool = Field(default=False, description="Replace the decision's earlier report; both are recorded.")
 
 
 class OverrideBody(Message):

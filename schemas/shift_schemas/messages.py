@@ -21,6 +21,9 @@ SessionState = Literal["live", "ending", "ended"]
 GazeOutcome = Literal["applied", "late"]
 Seconds = Annotated[float, Field(ge=-1e11, le=1e11)]
 Text = Annotated[str, Field(max_length=10_000)]
+Warnings = Annotated[list[str], Field(max_length=100)]
+FORMAT = 2
+"""What a session records. 1: no shares of gaze, no warnings, no restarts. A session keeps its first format."""
 DEEPEST = 32
 """Nesting of a plain JSON object within a message; a study has 6."""
 
@@ -92,6 +95,8 @@ class Session(Fact):
     replay_of: str = Field(default="", description="Name of the recording that this session replays.")
     software: str = Field(default="", description="Version of shift-mesh.")
     revision: str = Field(default="", description="Git revision of shift-mesh, where known.")
+    format: Count = Field(default=1, description="Which facts and fields the session records; today 2.")
+    warnings: Warnings = Field(default=[], description="What was accepted at its start and may not be meant.")
 
 
 class Config(Fact):
@@ -122,12 +127,14 @@ class Gaze(Fact):
 
     source: Id = Field(description="The gaze source.")
     seq: Count = Field(description="Number of the chunk within its source, from 0.")
+    segment: Count = Field(default=0, description="One more with each restart of the source's clock or numbering.")
     outcome: GazeOutcome = Field(default="applied", description="late: recorded, not applied.")
     t: list[Seconds] = Field(description="Source clock, s.")
     x: list[float] = Field(default=[], description="0..1 from the left; empty for gaze on AOIs.")
     y: list[float] = Field(default=[], description="0..1 from the top; empty for gaze on AOIs.")
     valid: list[bool] = Field(default=[], description="Whether the sample is one; empty for gaze on AOIs.")
     aoi: list[str] = Field(default=[], description="AOI names, '' is none; empty for points.")
+    warnings: Warnings = Field(default=[], description="What was accepted and may not be meant, or has no effect.")
 
 
 class Fixation(Fact):
@@ -136,6 +143,7 @@ class Fixation(Fact):
     subject = "fixation"
 
     source: Id = Field(description="The gaze source.")
+    segment: Count = Field(default=0, description="The segment of the source that it began in.")
     start_s: Seconds = Field(description="Start, source clock, s.")
     duration_s: Annotated[float, Field(ge=0)] = Field(description="Duration, s.")
     x: float = Field(description="Mean position, 0..1 from the left.")
@@ -159,6 +167,17 @@ class GazeView(Message):
     aoi: str = Field(description="The held target; '' is none.")
     fixations: Count = Field(description="Finished fixations so far.")
     dropped: Count = Field(description="Gaze chunks that never came, by their numbers.")
+    restarts: Count | None = Field(default=None, description="How often a source began its clock or numbering anew.")
+    samples: Count | None = Field(default=None, description="Samples applied, all sources together.")
+    dwell_s: float | None = Field(default=None, description="Dwell on AOIs in this session, s.")
+    lost: float | None = Field(default=None, description="Share of the source's time without a valid sample, 0..1.")
+    unclassified: float | None = Field(default=None, description="Share of its time in no fixation, 0..1.")
+    off_aoi: float | None = Field(default=None, description="Share of its time on no AOI, 0..1.")
+    off_stimulus: float | None = Field(
+        default=None, description="Share of its time with points outside 0..1; part of unclassified or off_aoi."
+    )
+    received: Stamp | None = Field(default=None, description="When the last applied sample was received.")
+    age_s: float | None = Field(default=None, description="Time since then at the observation's stamp, s.")
 
 
 class AwarenessView(Message):
@@ -179,6 +198,7 @@ class Observation(Fact):
     capacity: CapacityView
     gaze: GazeView
     awareness: dict[Id, AwarenessView] = Field(description="Per task that has results.")
+    warnings: Warnings = Field(default=[], description="Those of the last gaze and of the last result.")
 
 
 # --- the decider's ---
@@ -279,6 +299,11 @@ class Performance(Fact):
     enabledness: ScoredResult
     reward: float
     cumulative_reward: float
+    corrects: bool = Field(default=False, description="It replaces an earlier report of the same decision.")
+    result: Count = Field(
+        default=0, description="Which of the task's results it is, from 1; a correction has that of the first report."
+    )
+    warnings: Warnings = Field(default=[], description="What was accepted and may not be meant.")
 
 
 class Transition(Fact):
@@ -376,9 +401,12 @@ class Command(Message):
     session: Id
     need: Seen = Field(default=Seen(), description="What the answerer must have seen: read your own writes.")
 
+    beside: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
+    """Fields that do not make it another command."""
+
     def content(self) -> str:
         """What makes a repeat a repeat: everything but what the door had seen by then."""
-        return self.model_dump_json(exclude={"need", "command_id"})
+        return self.model_dump_json(exclude=set(self.beside))
 
 
 START_ID, END_ID = "start", "end"
@@ -389,6 +417,7 @@ class StartSession(Command):
     """Begin a session."""
 
     procedure = "start_session"
+    beside = frozenset({"need", "command_id", "format"})
 
     participant: Id
     study: str | JsonObject = Field(default="default", description="A study's id, or the study itself.")
@@ -397,6 +426,7 @@ class StartSession(Command):
     replay_of: str = ""
     software: str = ""
     revision: str = ""
+    format: Count = FORMAT
 
 
 class EndSession(Command):
@@ -445,12 +475,23 @@ class SetOverride(Command):
 
 
 class ReportPerformance(Command):
-    """How the task went. ``command_id`` is the decision's id."""
+    """How the task went. ``command_id`` is the decision's id; a correction has an id of its own."""
 
     procedure = "report_performance"
 
     comprehension: Result
     enabledness: Result
+    corrects: Id | None = Field(default=None, description="The decision whose report this one replaces.")
+
+    def content(self) -> str:
+        """A first report's content has no ``corrects``, as before there were corrections."""
+        beside = self.beside if self.corrects is not None else {*self.beside, "corrects"}
+        return self.model_dump_json(exclude=set(beside))
+
+    @property
+    def decision_id(self) -> str:
+        """The decision that is reported."""
+        return self.corrects or self.command_id
 
 
 COMMANDS: dict[str, type[Command]] = {

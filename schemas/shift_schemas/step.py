@@ -21,6 +21,8 @@ class Step(Generic[S]):
     state: S
     facts: tuple[Fact, ...] = ()
     result: Fact | dict[str, Any] = field(default_factory=dict)
+    repeat: bool = False
+    """Whether ``result`` is that of an earlier, equal request."""
 
 
 class NotYet(Exception):

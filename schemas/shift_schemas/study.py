@@ -80,6 +80,9 @@ class AttentionSettings(_Part):
 
     step_s: Positive = Field(default=0.1, description="Dwell that is one application of the equation, s; chosen.")
     maximum_dwell_s: Positive = Field(default=1.0, description="A named sample stands for at most this, s; chosen.")
+    minimum_dwell_s: NonNegative = Field(
+        default=0.5, description="The gaze class is uncertain until so much dwell on AOIs, s; chosen."
+    )
     weight_step: Probability = Field(default=0.10, description="Gain of the fixated AOI per application (Δ_w); chosen.")
     weight_min: Probability = Field(default=0.0, description="Floor of a weight (w_min); chosen.")
     shift_increase: NonNegative = Field(default=0.20, description="Rise per change of target (Δ_inc); chosen.")
@@ -341,6 +344,9 @@ class Study(_Part):
         ],
         description="Areas of interest; where two overlap, the first counts. Left out: the thirds of the stimulus.",
     )
+    require_condition: bool = Field(
+        default=False, description="Whether a start without a condition is refused; chosen: a warning only."
+    )
     conditions: Annotated[dict[Id, dict[str, Any]], Field(max_length=32)] = Field(
         default={}, description="Each overrides parts of what stands below it."
     )
@@ -384,6 +390,8 @@ class Study(_Part):
                 f"attention.distracted_dominance is {self.attention.distracted_dominance}; it must not exceed "
                 f"attention.focused_dominance, which is {self.attention.focused_dominance}"
             )
+        if self.require_condition and not self.conditions:
+            raise ValueError("require_condition is true and the study has no conditions; write conditions, or false")
         for name, overrides in self.conditions.items():
             if fixed := sorted(set(overrides) - CONDITIONAL):
                 raise ValueError(
@@ -402,6 +410,7 @@ CONDITIONAL: frozenset[str] = frozenset(Study.model_fields) - {
     "title",
     "tasks",
     "aois",
+    "require_condition",
     "conditions",
 }
 """What a condition can override."""

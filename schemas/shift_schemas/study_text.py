@@ -122,7 +122,17 @@ def study_json(study: Study) -> str:
 @lru_cache(maxsize=128)
 def study_from_json(text: str) -> Study:
     """The inverse of :func:`study_json`, remembered: a study in force is read at every message of its session."""
-    return study_of(json.loads(text))
+    return study_of(as_recorded(json.loads(text)))
+
+
+def as_recorded(data: Any) -> Any:
+    """Return a study that was written out whole, with the rules of its time where it lacks a value of today.
+
+    Version 0.1 had no ``attention.minimum_dwell_s``: the gaze class held from the first sample on an AOI.
+    """
+    if isinstance(data, dict) and isinstance(attention := data.get("attention"), dict):
+        return {**data, "attention": {"minimum_dwell_s": 0.0, **attention}}
+    return data
 
 
 def _in_force(study: Study, condition: str, name: str, lines: Lines) -> Study:

@@ -70,7 +70,7 @@ class Mesh:
     def start(self, name: str) -> None:
         """Run a service on its journal."""
         bus = MemoryBus(self.hub)
-        journal = Journal(self.data / "state" / f"{name}.sqlite", name)
+        journal = Journal(self.data / "state" / f"{name}.sqlite", name, CORES[name].lookups)
         given = (CORES[name], bus, journal, self.clock, Metrics(name))
         worker: Worker[Any] = Worker(*given)
         if name == "recorder":

@@ -14,6 +14,7 @@ from shift_learner.core import LearnerState
 from shift_learner.learners import learner_named
 from shift_schemas.errors import Conflict, InvalidStudy, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import (
+    FORMAT,
     Config,
     Decision,
     Fact,
@@ -40,7 +41,9 @@ ACTIONS = Study(study="x").scoring.actions
 
 def session(state: Any = "live") -> Session:
     """The session's fact in one of its states."""
-    return Session(session="s1", stamp=NOW, participant="P01", study="x", seed=7, state=state, started=NOW)
+    return Session(
+        session="s1", stamp=NOW, participant="P01", study="x", seed=7, state=state, started=NOW, format=FORMAT
+    )  # fmt: skip
 
 
 def config(version: int = 1, **learner: Any) -> Config:
@@ -380,3 +383,85 @@ def test_a_refused_command_leaves_the_state_as_it_was(history: list[Any]) -> Non
         with pytest.raises((ShiftError, NotYet)):
             core.step(state, report(999), NOW, late=late)
     assert core.dump(state) == before
+
+
+# --- corrections ---
+
+
+def correction(n: int, understood: bool = True, able: bool = True, seconds: float = 5.0) -> ReportPerformance:
+    """Another report of the ``n``-th decision, in the place of the one before it."""
+    told = report(n, understood, able, seconds)
+    return told.model_copy(update={"command_id": f"c-{n}", "corrects": f"d{n}"})
+
+
+def test_a_correction_is_recorded_beside_the_first_report_and_counts_in_its_place() -> None:
+    state, facts = folded(session(), config(), decision(1), report(1, False, False), decision(2), report(2))
+    first, second = [f for f in facts if isinstance(f, Performance)]
+    done = core.step(state, correction(1, True, True, 2.0), NOW)
+    performance = of_kind(done.facts, Performance)
+    assert (performance.corrects, performance.decision_id, performance.n, performance.result) == (True, "d1", 3, 1)
+    assert (first.result, second.result) == (1, 2)
+    assert performance.cumulative_reward == pytest.approx(second.reward + exp(-0.2))
+    assert of_kind(done.facts, Transition).reward == pytest.approx(exp(-0.2))
+    assert of_kind(done.facts, Policy).cumulative_reward == performance.cumulative_reward
+
+
+@pytest.mark.parametrize("name", ["q-learning", "epsilon-greedy", "ucb1", "thompson", "linear-thompson", "planner"])
+def test_a_correction_is_learned_from_once_more(name: str) -> None:
+    state, _ = folded(session(), config(name=name), decision(1), report(1, False, False))
+    learner, memory = learner_named(name), state.memory
+    done = core.step(state, correction(1), NOW)
+    known = state.reported["d1"].open
+    naive = learner.rewarded(core.context_of(state.config.study), memory, known.taken, exp(-0.5), None)  # type: ignore[union-attr]
+    assert learner.dump(done.state.memory) == learner.dump(naive)
+
+
+def test_a_correction_of_what_waits_for_the_next_decision_is_learned_from_in_its_place() -> None:
+    start = (session(), config(discount=0.9), decision(1), report(1, False, False))
+    _, corrected = folded(*start, correction(1), decision(2))
+    _, right_at_once = folded(*start[:3], report(1), decision(2))
+    (once,), (other,) = ([f for f in facts if isinstance(f, Transition)] for facts in (corrected, right_at_once))
+    assert (once.reward, once.value) == (other.reward, other.value)
+
+
+def test_a_correction_with_a_discount_is_learned_from_with_the_decision_that_followed() -> None:
+    state, _ = folded(session(), config(discount=0.9), decision(1), report(1, False, False), decision(2))
+    assert state.reported["d1"].open.following is not None
+    facts = core.step(state, correction(1), NOW).facts
+    assert [type(f).__name__ for f in facts] == ["Performance", "Transition", "Policy"]
+
+
+def test_the_same_correction_again_gets_the_report_that_is_in_force() -> None:
+    state, _ = folded(session(), config(), decision(1), report(1, False, False), correction(1))
+    again = core.step(state, correction(1).model_copy(update={"command_id": "c-9"}), NOW)
+    assert (again.state, again.facts, again.repeat) == (state, (), True)
+    assert isinstance(again.result, dict)
+    assert (again.result["n"], again.result["corrects"]) == (2, True)
+    back = core.step(state, correction(1, False, False).model_copy(update={"command_id": "c-8"}), NOW)
+    assert of_kind(back.facts, Performance).cumulative_reward == pytest.approx(-exp(-0.5))
+
+
+def test_nothing_to_correct_is_said() -> None:
+    state, _ = folded(session(), config(), decision(1))
+    with pytest.raises(Conflict, match="decision d1 has no report yet"):
+        core.step(state, correction(1), NOW)
+    with pytest.raises(UnknownThing, match="no report of decision d7 that can be corrected; the last 256"):
+        core.step(state, correction(7), NOW, late=True)
+
+
+def test_only_so_many_reports_are_kept_for_corrections() -> None:
+    state = begun(name="scoring")
+    for n in range(1, core.CORRECTABLE + 3):
+        state, _ = core.step(state, decision(n), NOW).state, None
+        state = core.step(state, report(n), NOW).state
+    assert len(state.reported) == core.CORRECTABLE
+    assert "d2" not in state.reported
+    assert core.load(core.dump(state)) == state
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(3600.0, 0), (3600.5, 2), (5000.0, 2)])
+def test_a_duration_above_an_hour_is_told_of(seconds: float, told: int) -> None:
+    _, facts = folded(session(), config(), decision(1), report(1, seconds=seconds))
+    warnings = of_kind(facts, Performance).warnings
+    assert len(warnings) == told
+    assert all("must be in seconds" in w for w in warnings)

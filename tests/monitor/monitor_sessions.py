@@ -7,11 +7,14 @@ from typing import Any
 
 from shift_cli.gaze_files import Sample, chunks, samples
 from shift_monitor.core import MonitorState, step
+from shift_monitor.gaze_input import gaze_input
 from shift_schemas.messages import (
+    FORMAT,
     Config,
     Decision,
     Fact,
     Fixation,
+    Gaze,
     GazeChunk,
     Message,
     Observation,
@@ -36,7 +39,9 @@ def study(**parts: Any) -> Study:
 
 
 def session(state: str = "live") -> Session:
-    return Session(session="s1", stamp=NOW, participant="P01", study="test", seed=7, state=state, started=NOW)  # type: ignore[arg-type]
+    return Session(
+        session="s1", stamp=NOW, participant="P01", study="test", seed=7, state=state, started=NOW, format=FORMAT,
+    )  # type: ignore[arg-type]  # fmt: skip
 
 
 def config(of: Study, version: int = 1) -> Config:
@@ -75,10 +80,25 @@ def began(of: Study | None = None) -> MonitorState:
     return fold(None, session(), config(of or study()))[0]
 
 
-def fold(state: MonitorState | None, *events: Message) -> tuple[MonitorState, list[Fact]]:
+class Recorded:
+    """Gaze that the monitor put out: what its journal would find again."""
+
+    def __init__(self) -> None:
+        self.gaze: list[Gaze] = []
+
+    def __call__(self, subject: str, **fields: object) -> list[Gaze]:
+        return [g for g in self.gaze if all(getattr(g, name) == value for name, value in fields.items())]
+
+
+def fold(
+    state: MonitorState | None, *events: Message, recorded: Recorded | None = None
+) -> tuple[MonitorState, list[Fact]]:
+    """Step through events; gaze that ``recorded`` has, and that this fold puts out, is told from restarts."""
     facts: list[Fact] = []
+    kept = recorded or Recorded()
     for event in events:
-        done = step(state, event, NOW)
+        done = step(state, gaze_input(event, kept) if isinstance(event, GazeChunk) else event, NOW)
+        kept.gaze += [f for f in done.facts if isinstance(f, Gaze)]
         state = done.state
         facts += done.facts
     assert state is not None

@@ -178,8 +178,20 @@ def test_finer_samples_of_the_same_gaze_leave_the_same(gaze: list[tuple[int, int
     ],
 )
 def test_the_class_has_fixed_thresholds_with_a_margin(weights: tuple[float, ...], shift: float, category: str) -> None:
-    assert gaze_class(Attention(weights, shift, met=True), SETTINGS) == category
+    assert gaze_class(Attention(weights, shift, met=True, dwell_ns=NS // 2), SETTINGS) == category
     assert gaze_class(Attention(weights, shift), SETTINGS) == "uncertain"
+
+
+def test_the_class_is_uncertain_until_half_a_second_of_dwell_on_aois() -> None:
+    enough = dwelt(met_aoi(fresh(2)), on(0, 0.5), HOLD_NS, 0, SETTINGS)
+    too_little = dwelt(met_aoi(fresh(2)), on(0, 0.499), HOLD_NS, 0, SETTINGS)
+    beside = dwelt(met_aoi(fresh(2)), on(NOWHERE, 5.0), HOLD_NS, 0, SETTINGS)
+    assert [gaze_class(a, SETTINGS) for a in (enough, too_little, beside)] == ["focused", "uncertain", "uncertain"]
+
+
+def test_a_study_that_asks_for_no_dwell_has_a_class_from_the_first_sample_on() -> None:
+    assert gaze_class(met_aoi(fresh(2)), AttentionSettings(minimum_dwell_s=0.0)) == "focused"
+    assert gaze_class(fresh(2), AttentionSettings(minimum_dwell_s=0.0)) == "uncertain"
 
 
 def test_an_aoi_name_stands_until_the_next_and_at_most_the_maximum() -> None:

@@ -6,7 +6,8 @@ import random
 
 import pytest
 from monitor_sessions import began, config, fold, last, performance, study
-from shift_monitor.awareness import HISTORY_LENGTH, History, awareness_view, reported
+from shift_monitor.awareness import HISTORY_LENGTH, History, awareness_view, corrected, reported
+from shift_schemas.messages import Performance
 
 
 @pytest.mark.parametrize(
@@ -63,3 +64,23 @@ def test_the_history_is_bounded() -> None:
     assert len(longer.comprehension) == HISTORY_LENGTH
     assert longer.comprehension.endswith("0")
     assert longer.results == HISTORY_LENGTH + 1
+
+
+def test_a_correction_takes_the_place_of_the_result_that_it_corrects() -> None:
+    history = History()
+    for n, success in enumerate((True, False, True), start=1):
+        history = reported(history, result(n, success))
+    after = corrected(history, result(4, True, of=2))
+    assert (after.comprehension, after.enabledness, after.results) == ("111", "111", 3)
+    assert corrected(after, result(5, False, of=3)).comprehension == "110"
+
+
+def test_a_correction_of_a_result_that_the_history_forgot_changes_nothing() -> None:
+    history = History("01", "01", results=12)
+    assert corrected(history, result(13, True, of=10)) == history
+    assert corrected(history, result(13, True, of=11)).comprehension == "11"
+
+
+def result(n: int, success: bool, of: int = 0) -> Performance:
+    told = performance(n, success, success)
+    return told.model_copy(update={"corrects": of > 0, "result": of or n})

@@ -11,6 +11,7 @@ from monitor_sessions import (
     NEGATION,
     NOW,
     RECORDINGS,
+    Recorded,
     began,
     config,
     decision,
@@ -27,6 +28,7 @@ from monitor_sessions import (
 )
 from shift_cli.gaze_files import Sample, chunks
 from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
+from shift_monitor.gaze_input import gaze_input
 from shift_schemas.errors import Conflict, MalformedMessage, Unavailable, UnknownThing
 from shift_schemas.messages import (
     Config,
@@ -272,6 +274,8 @@ def test_gaze_is_uncertain_before_the_first_valid_sample_on_an_aoi() -> None:
     state, facts = fold(began(one), points(0, [0.0, 0.01], [None, 0.9]))
     assert last(facts).gaze.category == "uncertain"
     _, facts = fold(state, points(1, [0.02], [0.2]))
+    assert last(facts).gaze.category == "uncertain"  # no dwell yet
+    _, facts = fold(state, points(1, [0.02 + i / 100 for i in range(60)], [0.2] * 60))
     assert last(facts).gaze.category == "focused"
 
 
@@ -280,10 +284,11 @@ def test_gaze_is_uncertain_before_the_first_valid_sample_on_an_aoi() -> None:
 
 def test_a_repeat_is_answered_alike_and_ignored() -> None:
     chunk = names(0, [0.0, 0.1], ["left", "left"])
-    first = step(began(), chunk, NOW)
-    again = step(first.state, chunk, NOW)
-    assert (again.state, again.facts) == (first.state, ())
-    assert again.result == first.result == {"accepted": 2, "source": "ros", "seq": 0}
+    recorded = Recorded()
+    state, facts = fold(began(), chunk, names(1, [0.2], ["right"]), recorded=recorded)
+    again = step(state, gaze_input(chunk, recorded), NOW)
+    assert (again.state, again.facts, again.repeat) == (state, (), True)
+    assert again.result == {"accepted": 2, "source": "ros", "seq": 0, "observation": last(facts).version}
 
 
 def test_a_gap_is_counted() -> None:
@@ -295,26 +300,35 @@ def test_a_gap_is_counted() -> None:
 
 
 def test_a_late_chunk_is_recorded_and_not_applied_and_its_repeat_ignored() -> None:
-    state, before = fold(began(), names(0, [0.0], ["left"]), names(3, [0.3], ["left"]))
+    recorded = Recorded()
+    state, before = fold(began(), names(0, [0.0], ["left"]), names(3, [0.3], ["left"]), recorded=recorded)
     done = step(state, names(1, [0.1], ["right"]), NOW)
+    recorded.gaze += [f for f in done.facts if isinstance(f, Gaze)]
     gaze, observation = done.facts
     assert isinstance(gaze, Gaze)
     assert isinstance(observation, Observation)
     assert gaze.outcome == "late"
     assert observation.gaze == last(before).gaze
     assert observation.seen.gaze == {"ros": 3}
-    assert done.result == {"accepted": 0, "source": "ros", "seq": 1}
-    assert step(done.state, names(1, [0.1], ["right"]), NOW).facts == ()
+    assert done.result == {
+        "accepted": 0, "source": "ros", "seq": 1, "observation": 4,
+        "warnings": ["chunk 1 comes after chunk 3: it is recorded and not applied"],
+    }  # fmt: skip
+    assert observation.warnings == gaze.warnings == done.result["warnings"]
+    assert step(done.state, gaze_input(names(1, [0.1], ["right"]), recorded), NOW).facts == ()
     assert len(step(done.state, names(2, [0.2], ["right"]), NOW).facts) == 2
 
 
-def test_many_gaps_are_remembered_up_to_a_bound() -> None:
-    state = began()
-    for n in range(200):
-        state, _ = fold(state, names(2 * n + 1, [float(n)], ["left"]))
-    assert state.stream is not None
-    assert len(state.stream.numbering.gaps) == 64
-    assert state.dropped == 200
+def test_a_late_chunk_of_any_of_two_hundred_gaps_is_recorded() -> None:
+    recorded = Recorded()
+    read = [names(2 * n + 1, [float(n)], ["left"]) for n in range(200)]
+    state, _ = fold(began(), *read, recorded=recorded)
+    late = [names(2 * n, [n - 0.5], ["right"]) for n in range(200)]
+    after, facts = fold(state, *late, recorded=recorded)
+    outcomes = [f.outcome for f in facts if isinstance(f, Gaze)]
+    assert outcomes == ["late"] * 200
+    assert (after.dropped, after.restarts) == (200, 0)
+    assert after.attention == state.attention
 
 
 def test_a_source_that_begins_to_speak_takes_over() -> None:
@@ -342,6 +356,7 @@ def test_a_time_that_does_not_rise_is_refused_and_changes_nothing() -> None:
     with pytest.raises(MalformedMessage) as refused:
         step(state, names(1, [0.5], ["left"]), NOW)
     assert refused.value.errors[0].field == "t"
+    assert step(state, names(1, [0.4], ["left"]), NOW).state.restarts == 1  # a clock that goes back is a restart
     with pytest.raises(MalformedMessage):
         step(state, names(1, [0.6, 0.6 + 1e-11], ["left", "left"]), NOW)
 

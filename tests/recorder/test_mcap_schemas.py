@@ -139,7 +139,7 @@ def test_a_field_without_a_value_is_left_out_and_not_required() -> None:
     assert SCHEMAS["decision"]["properties"]["propensity"]["type"] == "number"
 
 
-def test_only_top_level_fields_can_be_none_so_that_reading_can_put_them_back() -> None:
+def test_what_can_be_none_within_a_field_is_none_where_it_was_left_out() -> None:
     def nested(kind: type[BaseModel]) -> set[type[BaseModel]]:
         return {
             m
@@ -150,4 +150,5 @@ def test_only_top_level_fields_can_be_none_so_that_reading_can_put_them_back() -
 
     for kind in FACTS.values():
         for part in nested(kind) | {Seen}:
-            assert not any(type(None) in getattr(f.annotation, "__args__", ()) for f in part.model_fields.values())
+            optional = [f for f in part.model_fields.values() if type(None) in getattr(f.annotation, "__args__", ())]
+            assert all(f.default is None for f in optional)

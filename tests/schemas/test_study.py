@@ -28,12 +28,13 @@ tasks: [grasp, turn, pour]           # left out: any id is a task
 aois:                                # 0..1 from the upper left corner; where two overlap, the first counts
   - {name: robot, rectangle: [0.0, 0.0, 0.33, 1.0]}            # left, top, right, bottom
   - {name: cup, polygon: [[0.33, 0.0], [1.0, 0.0], [1.0, 1.0], [0.33, 1.0]]}
+require_condition: false             # true: a start without a condition is refused
 conditions:                          # each overrides parts of what stands below
   control: {learner: {name: scoring}}
   adaptive: {}
 interactions: 100                    # planned number; epsilon reaches 0 there
 capacity: {start: 1.0, min: 0.0, max: 1.0, recovery: 0.30, demanding_cost: 0.20, other_cost: 0.10, threshold: 0.5, demanding: [negation_affirmation, negation]}
-attention: {step_s: 0.1, maximum_dwell_s: 1.0, weight_step: 0.10, weight_min: 0.0, shift_increase: 0.20, shift_decrease: 0.05, focused_dominance: 0.5, focused_shift: 0.33, distracted_dominance: 0.35, distracted_shift: 0.66}
+attention: {step_s: 0.1, maximum_dwell_s: 1.0, minimum_dwell_s: 0.5, weight_step: 0.10, weight_min: 0.0, shift_increase: 0.20, shift_decrease: 0.05, focused_dominance: 0.5, focused_shift: 0.33, distracted_dominance: 0.35, distracted_shift: 0.66}
 fixation: {method: i-dt, dispersion_deg: 2.0, minimum_duration_s: 0.06, median_filter_s: 0.03, maximum_gap_s: 0.075, screen_width_cm: 50.9, screen_height_cm: 28.6, distance_cm: 65.0}
 awareness: {window: 1, threshold: 0.5}
 reward: {decay: 0.1, scale: 1.0}

@@ -7,7 +7,7 @@ from itertools import product
 import pytest
 from shift_monitor import core
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.messages import Config, Observation, Session
+from shift_schemas.messages import FORMAT, Config, Observation, Session
 from shift_schemas.stamps import Stamp
 from shift_schemas.study import Study
 from shift_schemas.study_text import study_json
@@ -15,6 +15,7 @@ from shift_schemas.words import GAZES, GazeClass
 from shift_simulator.gaze_plan import chunk_of, plan_gaze
 
 NOW = Stamp.of(0)
+BEGUN = Session(session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW, format=FORMAT)
 
 
 def study_with(aois: int, **attention: float) -> Study:
@@ -23,7 +24,9 @@ def study_with(aois: int, **attention: float) -> Study:
 
 
 def classes_reached(study: Study, wanted: list[GazeClass]) -> list[GazeClass]:
-    session = Session(session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW)
+    session = Session(
+        session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW, format=FORMAT
+    )
     state = core.step(None, session, NOW).state
     done = core.step(state, Config(session="s", stamp=NOW, version=1, study=study_json(study)), NOW)
     clock_ns, found = 0, list[GazeClass]()
@@ -72,7 +75,9 @@ def test_what_no_gaze_can_reach_is_said() -> None:
 def test_a_plan_is_the_same_every_time_and_nothing_where_nothing_is_to_be_done() -> None:
     study = study_with(3)
     observation = core.observation_of
-    session = Session(session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW)
+    session = Session(
+        session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW, format=FORMAT
+    )
     state = core.step(None, session, NOW).state
     state = core.step(state, Config(session="s", stamp=NOW, version=1, study=study_json(study)), NOW).state
     view = observation(state, NOW).gaze

@@ -174,7 +174,10 @@ def lacks(state: DeciderState, need: Seen) -> Lacks:
     observation, policy = state.observation, state.policy
     return Lacks(
         config=version < max(1, need.config),
-        observation=observation is None or lacking(observation.seen) or not covers_gaze(observation.seen, need),
+        observation=observation is None
+        or observation.version < need.observation
+        or lacking(observation.seen)
+        or not covers_gaze(observation.seen, need),
         policy=policy is None or policy.for_n != state.n + 1 or lacking(policy.seen),
     )
 

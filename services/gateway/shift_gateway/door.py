@@ -15,6 +15,7 @@ from shift_runtime.door import READ_WAIT_S, CommandDoor
 from shift_runtime.mesh_client import MeshClient
 from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, shorten
 from shift_schemas.messages import Observation, Seen, Session
+from shift_schemas.stamps import NS
 from shift_schemas.step import NotYet, covers
 
 from shift_gateway.replica import Replica, View, decider_state
@@ -47,17 +48,24 @@ class Door(CommandDoor):
     async def observation(self, session: str) -> dict[str, Any]:
         """The partner model, with all in it that was answered before."""
         view = await self._current(session, "monitor")
-        need = view.need.model_copy(update={"observation": 0, "policy": 0})
-        found = await self._newest(view, "monitor", lambda: view.observation if _has(view.observation, need) else None)
+        version, need = view.need.observation, view.need.model_copy(update={"observation": 0, "policy": 0})
+
+        def newest() -> Observation | None:
+            found = view.observation
+            return found if found is not None and found.version >= version and covers(found.seen, need) else None
+
+        found = await self._newest(view, "monitor", newest)
         assert isinstance(found, Observation)
         data: dict[str, Any] = found.model_dump(mode="json")
         data["gaze"]["aoi"] = data["gaze"]["aoi"] or None
+        if (received := found.gaze.received) is not None:
+            data["gaze"]["age_s"] = max(self.clock.now().ns - received.ns, 0) / NS
         return data
 
     async def policy(self, session: str) -> dict[str, Any]:
         """The policy for the next decision."""
         view = await self._current(session, "learner")
-        need = view.need.model_copy(update={"gaze": {}, "observation": 0, "policy": 0})
+        need = view.need.model_copy(update={"observation": 0, "policy": 0})
         found = await self._newest(view, "learner", lambda: view.policy if _has(view.policy, need) else None)
         data: dict[str, Any] = found.model_dump(mode="json")
         return data

@@ -23,6 +23,7 @@ from shift_schemas.messages import (
     Policy,
     PolicyRow,
     ReportPerformance,
+    Result,
     Seen,
     Session,
     SessionState,
@@ -40,6 +41,10 @@ from shift_learner.reward import reward, task_performance
 
 WAIT_S = 2.0
 """How long a report waits for its decision or configuration to come in; chosen, as the decider's."""
+LONGEST_PLAUSIBLE_S = 3600.0
+"""Chosen: a task that takes longer is told of, for it is likelier that milliseconds were meant."""
+CORRECTABLE = 256
+"""Chosen: so many of the last reported decisions can be corrected; each is kept in the state."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,15 @@ class Open:
 
 
 @dataclass(frozen=True)
+class Reported:
+    """A reported decision, as far as a correction needs it."""
+
+    open: Open
+    performance: Performance
+    """The report in force."""
+
+
+@dataclass(frozen=True)
 class LearnerState:
     """All that the learner knows of one session. ``memory`` is the learner's own, as plain JSON on disk."""
 
@@ -64,6 +78,11 @@ class LearnerState:
     open: dict[str, Open] = field(default_factory=dict)
     rewards: dict[str, float] = field(default_factory=dict)
     """Reported, and waiting for the decision that follows."""
+    reported: dict[str, Reported] = field(default_factory=dict)
+    results: dict[str, int] = field(default_factory=dict)
+    """Reports of each task, corrections not counted."""
+    format: int = 1
+    """What the session records (``shift_schemas.messages.FORMAT``)."""
     last: Taken | None = None
     decisions: int = 0
     performances: int = 0
@@ -106,7 +125,7 @@ def step(state: LearnerState | None, message: Fact | Command, now: Stamp, late: 
     """
     if isinstance(message, Session):
         if state is None:
-            return Step(LearnerState(message.session, message.state))
+            return Step(LearnerState(message.session, message.state, format=message.format))
         return _ended(replace(state, phase=message.state), now)
     if state is None:
         raise UnknownThing(f"there is no session {message.session}")
@@ -163,24 +182,59 @@ def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[Learne
 def _reported(state: LearnerState, command: ReportPerformance, now: Stamp, late: bool) -> Step[LearnerState]:
     if state.phase != "live":
         raise Conflict(f"session {state.session} has ended")
+    if command.corrects is not None and command.corrects in state.reported:
+        return _corrected(state, command, now)
     _check_known(state, command, late)
-    if command.command_id in state.rewards:
-        raise Conflict(f"decision {command.command_id} has its performance already")
-    performance = _performance(state, command, now)
-    known = state.open[command.command_id]
-    after = replace(
+    decision_id = command.decision_id
+    if decision_id in state.rewards:
+        raise Conflict(f"decision {decision_id} has its performance already")
+    performance = _performance(state, command, state.open[decision_id].task, now)
+    return _learned(_counted(state, performance, state.open[decision_id]), performance, now)
+
+
+def _corrected(state: LearnerState, command: ReportPerformance, now: Stamp) -> Step[LearnerState]:
+    """Put another report in the place of an earlier one: it is applied once more, as the new value."""
+    known = state.reported[command.decision_id]
+    before = known.performance
+    if _results(before) == (command.comprehension, command.enabledness):
+        return Step(state, result=before.model_dump(mode="json"), repeat=True)
+    performance = _performance(state, command, before.task, now, before)
+    return _learned(_counted(state, performance, known.open), performance, now)
+
+
+def _results(performance: Performance) -> tuple[Result, Result]:
+    """What was reported, without what was made of it."""
+    both = (performance.comprehension, performance.enabledness)
+    comprehension, enabledness = (Result(success=r.success, duration_s=r.duration_s) for r in both)
+    return comprehension, enabledness
+
+
+def _counted(state: LearnerState, performance: Performance, known: Open) -> LearnerState:
+    """The state with a report in force that is still to be learned from."""
+    decision_id, task = performance.decision_id, performance.task
+    kept = {i: r for i, r in state.reported.items() if i != decision_id}
+    if len(kept) >= CORRECTABLE:
+        kept.pop(next(iter(kept)))
+    return replace(
         state,
         performances=performance.n,
         cumulative_reward=performance.cumulative_reward,
-        rewards={**state.rewards, command.command_id: performance.reward},
+        rewards={**state.rewards, decision_id: performance.reward},
+        open={**state.open, decision_id: state.open.get(decision_id, known)},
+        reported=kept | {decision_id: Reported(known, performance)} if state.format > 1 else {},
+        results={**state.results, task: max(performance.result, state.results.get(task, 0))},
     )
+
+
+def _learned(state: LearnerState, performance: Performance, now: Stamp) -> Step[LearnerState]:
+    """Learn from a report at once, unless the learner needs the decision that follows and there is none yet."""
     facts: tuple[Fact, ...] = (performance,)
+    known = state.open[performance.decision_id]
     waits = _learner(state).needs_following(_context(state)) and known.following is None
     if not waits:
-        after, transition = _updated(after, command.command_id, now)
+        state, transition = _updated(state, performance.decision_id, now)
         facts = (performance, transition)
-    done = _with_policy(after, facts, now)
-    return replace(done, result=performance)
+    return replace(_with_policy(state, facts, now), result=performance)
 
 
 def _ended(state: LearnerState, now: Stamp) -> Step[LearnerState]:
@@ -202,7 +256,7 @@ def _check_known(state: LearnerState, command: ReportPerformance, late: bool) ->
         owner
         for owner, lacking in (
             ("recorder", state.config is None or state.config.version < command.need.config),
-            ("decider", command.command_id not in state.open or state.decisions < command.need.decision),
+            ("decider", command.decision_id not in state.open or state.decisions < command.need.decision),
         )
         if lacking
     )
@@ -210,20 +264,44 @@ def _check_known(state: LearnerState, command: ReportPerformance, late: bool) ->
         raise NotYet(behind, WAIT_S)
     if state.config is None or state.decisions < command.need.decision:
         raise Unavailable(f"the learner has not heard all of the {' and the '.join(behind)} yet")
-    if command.command_id not in state.open:
-        raise UnknownThing(f"session {state.session} has no decision {command.command_id} that waits for a result")
+    if command.corrects is not None and command.decision_id not in state.open:
+        raise UnknownThing(
+            f"session {state.session} has no report of decision {command.corrects} that can be corrected; "
+            f"the last {CORRECTABLE} reports can be"
+        )
+    if command.decision_id not in state.open:
+        raise UnknownThing(f"session {state.session} has no decision {command.decision_id} that waits for a result")
+    if command.corrects is not None:
+        raise Conflict(
+            f"decision {command.corrects} has no report yet that could be corrected; send it without corrects"
+        )
 
 
-def _performance(state: LearnerState, command: ReportPerformance, now: Stamp) -> Performance:
+def _performance(
+    state: LearnerState, command: ReportPerformance, task: str, now: Stamp, before: Performance | None = None
+) -> Performance:
+    """The report as it is recorded; ``before`` is the one that it replaces."""
     settings = _context(state).study.reward
     comprehension = task_performance(command.comprehension, settings)
     enabledness = task_performance(command.enabledness, settings)
     gained = reward(comprehension.value, enabledness.value, settings)
     return Performance(
-        session=state.session, stamp=now, seen=_seen(state), decision_id=command.command_id,
-        task=state.open[command.command_id].task, n=state.performances + 1, comprehension=comprehension,
-        enabledness=enabledness, reward=gained, cumulative_reward=state.cumulative_reward + gained,
+        session=state.session, stamp=now, seen=_seen(state), decision_id=command.decision_id,
+        task=task, n=state.performances + 1, comprehension=comprehension, enabledness=enabledness, reward=gained,
+        cumulative_reward=state.cumulative_reward + gained - (before.reward if before else 0.0),
+        corrects=before is not None, **(_beside(state, command, task, before) if state.format > 1 else {}),
     )  # fmt: skip
+
+
+def _beside(state: LearnerState, command: ReportPerformance, task: str, before: Performance | None) -> dict[str, Any]:
+    """What a session of format 1 did not record of a report."""
+    warnings = [
+        f"{name}.duration_s is {given.duration_s:g} s, more than an hour: it must be in seconds, so divide "
+        "milliseconds by 1000; a report can be corrected with corrects: true"
+        for name, given in (("comprehension", command.comprehension), ("enabledness", command.enabledness))
+        if given.duration_s > LONGEST_PLAUSIBLE_S
+    ]
+    return {"result": before.result if before else state.results.get(task, 0) + 1, "warnings": warnings}
 
 
 def _updated(state: LearnerState, decision_id: str, now: Stamp) -> tuple[LearnerState, Transition]:
@@ -244,8 +322,16 @@ def _updated(state: LearnerState, decision_id: str, now: Stamp) -> tuple[Learner
         memory=memory,
         open={i: o for i, o in state.open.items() if i != decision_id},
         rewards={i: r for i, r in state.rewards.items() if i != decision_id},
+        reported=_with_open(state, decision_id, known),
     )
     return after, transition
+
+
+def _with_open(state: LearnerState, decision_id: str, known: Open) -> dict[str, Reported]:
+    """The reports with the decision as it was learned from: a correction is learned from in the same way."""
+    if (reported := state.reported.get(decision_id)) is None:
+        return state.reported
+    return state.reported | {decision_id: replace(reported, open=known)}
 
 
 def _with_policy(state: LearnerState, facts: tuple[Fact, ...], now: Stamp) -> Step[LearnerState]:

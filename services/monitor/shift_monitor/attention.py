@@ -38,6 +38,8 @@ class Attention(NamedTuple):
     """Where the last dwell ended, source clock; none: nothing to be continued."""
     met: bool = False
     """Whether a valid sample fell on an AOI yet."""
+    dwell_ns: int = 0
+    """Dwell on AOIs in this session."""
 
 
 class Dwell(NamedTuple):
@@ -70,13 +72,16 @@ def dwelt(attention: Attention, dwell: Dwell, hold_ns: int, gap_ns: int, setting
         if held_ns >= 0:
             shift = _shifted(shift, held, settings)
             held = target
-    weights = attention.weights
+    weights, dwell_ns = attention.weights, attention.dwell_ns
     if target != NOWHERE:
+        dwell_ns += duration_ns
         applications = duration_ns / NS / settings.step_s
         weights = weights_after(weights, target, settings.weight_step * applications, settings.weight_min)
         if target == held:
             shift = max(shift - settings.shift_decrease * (held_ns / NS / settings.step_s), 0.0)
-    return Attention(weights, shift, held, target, min(run_ns, hold_ns), start_ns + duration_ns, attention.met)
+    return Attention(
+        weights, shift, held, target, min(run_ns, hold_ns), start_ns + duration_ns, attention.met, dwell_ns
+    )  # fmt: skip
 
 
 def weights_after(weights: tuple[float, ...], target: int, gain: float, weight_min: float) -> tuple[float, ...]:
@@ -108,10 +113,10 @@ def weights_after(weights: tuple[float, ...], target: int, gain: float, weight_m
 def gaze_class(attention: Attention, settings: AttentionSettings) -> GazeClass:
     """Fixed thresholds on the largest weight and the focus shift (paper, III-A2; the values are chosen).
 
-    Uncertain before the first valid sample on an AOI.
+    Uncertain before the first valid sample on an AOI, and until ``minimum_dwell_s`` of dwell on AOIs.
     """
     dominance, shift = max(attention.weights), attention.focus_shift
-    if not attention.met:
+    if not attention.met or attention.dwell_ns < round(settings.minimum_dwell_s * NS):
         return "uncertain"
     if dominance >= settings.focused_dominance - MARGIN and shift <= settings.focused_shift + MARGIN:
         return "focused"
@@ -123,12 +128,14 @@ def gaze_class(attention: Attention, settings: AttentionSettings) -> GazeClass:
 def met_aoi(attention: Attention) -> Attention:
     """The same, once a valid sample has fallen on an AOI."""
     a = attention
-    return Attention(a.weights, a.focus_shift, a.held, a.run_target, a.run_ns, a.until_ns, True)
+    return Attention(a.weights, a.focus_shift, a.held, a.run_target, a.run_ns, a.until_ns, True, a.dwell_ns)
 
 
 def interrupted(attention: Attention) -> Attention:
     """The same before another source's clock: what was not held long enough yet is forgotten."""
-    return Attention(attention.weights, attention.focus_shift, attention.held, met=attention.met)
+    return Attention(
+        attention.weights, attention.focus_shift, attention.held, met=attention.met, dwell_ns=attention.dwell_ns
+    )
 
 
 def _shifted(shift: float, held: int, settings: AttentionSettings) -> float:

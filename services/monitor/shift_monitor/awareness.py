@@ -46,6 +46,18 @@ def reported(history: History, performance: Performance) -> History:
     )
 
 
+def corrected(history: History, performance: Performance) -> History:
+    """Return the history with one result replaced; one that is older than the history changes nothing."""
+    at = performance.result - 1 - (history.results - len(history.comprehension))
+    if at < 0:
+        return history
+    return History(
+        _replaced(history.comprehension, at, performance.comprehension.success),
+        _replaced(history.enabledness, at, performance.enabledness.success),
+        history.results,
+    )
+
+
 @lru_cache(maxsize=4096)
 def awareness_view(history: History, window: int, threshold: float) -> AwarenessView:
     """The class from the success ratio of each dimension over the last ``window`` results.
@@ -70,6 +82,10 @@ def awareness_views(histories: dict[str, History], settings: AwarenessSettings) 
 
 def _mark(success: bool) -> str:
     return "1" if success else "0"
+
+
+def _replaced(marks: str, at: int, success: bool) -> str:
+    return marks[:at] + _mark(success) + marks[at + 1 :]
 
 
 def _ratio(marks: str, window: int) -> float:

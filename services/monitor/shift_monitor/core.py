@@ -7,7 +7,7 @@ what was applied; so the order of the inputs can be read from the outputs, and a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -33,20 +33,32 @@ from shift_schemas.step import NotYet, Step
 
 from shift_monitor.areas import area_at
 from shift_monitor.attention import Attention, fresh, gaze_class, interrupted
-from shift_monitor.awareness import History, awareness_views, reported
+from shift_monitor.awareness import History, awareness_views, corrected, reported
 from shift_monitor.capacity import Capacity, capacity_class, executed
 from shift_monitor.fixation import Found, ended
-from shift_monitor.numbering import arrival, came_late, read, skipped
+from shift_monitor.gaze_account import broken_off, shares
+from shift_monitor.gaze_input import GazeInput, is_repeat
+from shift_monitor.gaze_warnings import (
+    clock_restart_warning,
+    jump_warnings,
+    late_warning,
+    next_spacings,
+    number_restart_warning,
+    rate_warnings,
+    share_warnings,
+)
+from shift_monitor.numbering import Arrival, Numbering, arrival, began_anew, read, skipped
 from shift_monitor.plan import Plan, name_of, plan_of
 from shift_monitor.stream import (
-    UNREAD,
+    IDLE,
+    NO_TIME,
     Stream,
     check_rise,
     check_samples,
     dwelt_on,
     names_applied,
     points_applied,
-    points_of,
+    recorded_columns,
 )
 
 CONFIG_WAIT_S = 0.2
@@ -80,6 +92,14 @@ class MonitorState:
     """Sources that were replaced, with their last chunk's number."""
     fixations: int = 0
     dropped: int = 0
+    restarts: int = 0
+    samples: int = 0
+    received: Stamp | None = None
+    """When the last applied sample came."""
+    format: int = 1
+    """What the session records (``shift_schemas.messages.FORMAT``)."""
+    gaze_warnings: tuple[str, ...] = ()
+    result_warnings: tuple[str, ...] = ()
     decision: int = 0
     performance: int = 0
     config: int = 0
@@ -90,7 +110,7 @@ _STATE = TypeAdapter(MonitorState)
 
 def initial(event: Session) -> MonitorState:
     """The state at the start of a session, before its configuration."""
-    return MonitorState(event.session)
+    return MonitorState(event.session, format=event.format)
 
 
 def dump(state: MonitorState) -> str:
@@ -137,8 +157,10 @@ def step(state: MonitorState | None, event: object, now: Stamp, late: bool = Fal
             return _observed(_decided(state, event, late), now)
         case Performance():
             return _observed(_performed(state, event, late), now)
-        case GazeChunk():
+        case GazeInput():
             return _gaze(state, event, now, late)
+        case GazeChunk():
+            return _gaze(state, GazeInput(event), now, late)
     return Step(state)
 
 
@@ -169,9 +191,23 @@ def observation_of(state: MonitorState, now: Stamp) -> Observation:
             aoi=name_of(plan, attention.held),
             fixations=state.fixations,
             dropped=state.dropped,
+            **(_quality(state, now) if state.format > 1 else {}),
         ),
         awareness=awareness_views(state.awareness, study.awareness),
+        warnings=[*state.gaze_warnings, *state.result_warnings],
     )
+
+
+def _quality(state: MonitorState, now: Stamp) -> dict[str, Any]:
+    """How good gaze is: what a session of format 1 did not record."""
+    share = shares(state.stream.account if state.stream else NO_TIME)
+    received = state.received
+    return {
+        "restarts": state.restarts, "samples": state.samples, "dwell_s": state.attention.dwell_ns / NS,
+        "lost": share.lost, "unclassified": share.unclassified, "off_aoi": share.off_aoi,
+        "off_stimulus": share.off_stimulus, "received": received,
+        "age_s": None if received is None else max(now.ns - received.ns, 0) / NS,
+    }  # fmt: skip
 
 
 # --- everything but gaze ---
@@ -203,76 +239,154 @@ def _decided(state: MonitorState, event: Decision, late: bool) -> MonitorState:
 
 def _performed(state: MonitorState, event: Performance, late: bool) -> MonitorState:
     _plan_in_force(state, late)
-    history = reported(state.awareness.get(event.task, History()), event)
-    return replace(state, awareness={**state.awareness, event.task: history}, performance=event.n)
+    history = (corrected if event.corrects else reported)(state.awareness.get(event.task, History()), event)
+    return replace(
+        state,
+        awareness={**state.awareness, event.task: history},
+        performance=event.n,
+        result_warnings=tuple(event.warnings),
+    )
 
 
 # --- gaze ---
 
 
-def _gaze(state: MonitorState, chunk: GazeChunk, now: Stamp, late: bool) -> Step[MonitorState]:
+def _gaze(state: MonitorState, given: GazeInput, now: Stamp, late: bool) -> Step[MonitorState]:
+    chunk = given.chunk
     if state.ended:
         raise Conflict(f"session {state.session} has ended")
     plan = _plan_in_force(state, late)
+    if (first := is_repeat(given)) is not None:
+        result = _result(state, chunk, first.accepted, first.warnings)
+        return Step(state, result={**result, "observation": state.version}, repeat=True)
     _check_source(state, chunk)
     check_samples(chunk, plan)
-    stream = state.stream
-    same = stream is not None and stream.source == chunk.source
-    numbering = stream.numbering if stream is not None and same else UNREAD
-    result = {"accepted": len(chunk.t), "source": chunk.source, "seq": chunk.seq}
-    match arrival(numbering, chunk.seq):
-        case "repeat":
-            return Step(state, result=result)
-        case "late":
-            assert stream is not None
-            after = replace(state, stream=replace(stream, numbering=came_late(numbering, chunk.seq)))
-            return _observed(after, now, (_gaze_fact(after, chunk, now, "late"),), result | {"accepted": 0})
-        case "new":
-            after, found = _applied(state, chunk, plan)
-            facts: Iterator[Fact] = (_fixation(after, f, now) for f in found)
-            return _observed(after, now, (_gaze_fact(after, chunk, now, "applied"), *facts), result)
-
-
-def _applied(state: MonitorState, chunk: GazeChunk, plan: Plan) -> tuple[MonitorState, list[tuple[str, Found]]]:
-    """The state after a new chunk, and the fixations that ended with it, with their source."""
     times = [round(t * NS) for t in chunk.t]
+    check_rise(None, times, chunk)
     stream = state.stream
-    ending: list[tuple[str, Found]] = []
     if stream is None or stream.source != chunk.source:
-        check_rise(None, times, chunk)
-        state, ending = _silenced(state)
-        stream = Stream(chunk.source)
-        former = state.stream
-        if former is not None:
-            state = replace(state, former={**state.former, former.source: former.numbering.last})
+        return _observed_gaze(*_taken_over(state, chunk), chunk, times, now)
+    match _arrival(state, stream, given, times):
+        case "late":
+            return _late(state, stream, chunk, now)
+        case "restart":
+            return _observed_gaze(*_restarted(state, stream, chunk, times), chunk, times, now)
+        case "new":
+            check_rise(stream.last_ns, times, chunk)
+            return _observed_gaze(*_gone_on(state, stream, chunk), chunk, times, now)
+
+
+def _arrival(state: MonitorState, stream: Stream, given: GazeInput, times: list[int]) -> Arrival:
+    seq, last_ns = given.chunk.seq, stream.last_ns
+    used = any(e.segment == stream.segment for e in given.earlier)
+    goes_on = last_ns is None or times[0] >= last_ns
+    if state.format == 1 and seq <= stream.numbering.last and not used:
+        return "late"  # as it was then: whatever its time says
+    return arrival(stream.numbering, seq, used, goes_on)
+
+
+def _late(state: MonitorState, stream: Stream, chunk: GazeChunk, now: Stamp) -> Step[MonitorState]:
+    """Record a late chunk: it changes nothing of the model."""
+    warnings = _told(state, [late_warning(chunk.seq, stream.numbering.last)])
+    after = replace(state, gaze_warnings=warnings)
+    facts = (_gaze_fact(after, chunk, now, "late"),)
+    return _observed(after, now, facts, _result(after, chunk, 0, warnings))
+
+
+Ending = list[tuple[str, int, Found]]
+"""Fixations that ended, each with its source and segment."""
+
+
+def _taken_over(state: MonitorState, chunk: GazeChunk) -> tuple[MonitorState, Stream, Ending, list[str]]:
+    """Another source begins to speak."""
+    state, ending = _silenced(state)
+    if (former := state.stream) is not None:
+        state = replace(state, former={**state.former, former.source: former.numbering.last})
+    return state, Stream(chunk.source), ending, []
+
+
+def _restarted(
+    state: MonitorState, stream: Stream, chunk: GazeChunk, times: list[int]
+) -> tuple[MonitorState, Stream, Ending, list[str]]:
+    """The source began its clock or its numbering anew: another segment of it, to which nothing is carried over."""
+    state, ending = _silenced(state)
+    numbering, segment = stream.numbering, stream.segment + 1
+    if chunk.seq > numbering.last:
+        assert stream.last_ns is not None
+        warning = clock_restart_warning(chunk.source, stream.last_ns, times[0], segment)
+        numbering = Numbering(numbering.last, chunk.seq)
     else:
-        check_rise(stream.last_ns, times, chunk)
-        if stream.last_ns is not None and (chunk.aoi is None) != (stream.named is None):  # another kind of gaze
-            state, ending = _silenced(state)
-            stream = Stream(chunk.source, stream.numbering)
+        warning = number_restart_warning(chunk.source, numbering.last, chunk.seq, segment)
+        numbering = began_anew(chunk.seq)
+    after = replace(state, restarts=state.restarts + 1)
+    return (
+        after,
+        Stream(stream.source, numbering, segment=segment, account=broken_off(stream.account)),
+        ending,
+        [warning],
+    )
+
+
+def _gone_on(state: MonitorState, stream: Stream, chunk: GazeChunk) -> tuple[MonitorState, Stream, Ending, list[str]]:
+    """The source goes on, perhaps with another kind of gaze."""
+    if stream.last_ns is None or (chunk.aoi is None) != (stream.named is None):
+        state, ending = _silenced(state)
+        account = broken_off(state.stream.account if state.stream else stream.account)
+        return state, Stream(stream.source, stream.numbering, segment=stream.segment, account=account), ending, []
+    return state, stream, [], []
+
+
+def _observed_gaze(
+    state: MonitorState, stream: Stream, ending: Ending, warnings: list[str], chunk: GazeChunk, times: list[int],
+    now: Stamp,
+) -> Step[MonitorState]:  # fmt: skip
+    """Apply a chunk to its stream, and put out what it was, what ended with it and what is observed."""
+    plan = plan_of(state.study)
     dropped = min(state.dropped + skipped(stream.numbering, chunk.seq), LARGEST_COUNT)
-    stream = Stream(stream.source, read(stream.numbering, chunk.seq), stream.last_ns, stream.named, stream.detector)
+    warnings += jump_warnings(stream.last_ns, times[0])
+    spacings = next_spacings(stream.spacings, stream.last_ns, times)
+    stream = replace(stream, numbering=read(stream.numbering, chunk.seq), spacings=spacings)
     if chunk.aoi is None:
         stream, attention, found = points_applied(stream, state.attention, times, chunk, plan)
     else:
         stream, attention, found = *names_applied(stream, state.attention, times, chunk.aoi, plan), []
-    after = replace(state, stream=stream, attention=attention, dropped=dropped, fixations=state.fixations + len(found))
-    return after, [*ending, *((chunk.source, f) for f in found)]
+    warnings += rate_warnings(spacings, chunk.aoi is None, plan.rule.gap_ns) + share_warnings(stream.account)
+    told = _told(state, warnings)
+    after = replace(
+        state, stream=stream, attention=attention, dropped=dropped, fixations=state.fixations + len(found),
+        samples=state.samples + len(times), received=now, gaze_warnings=told,
+    )  # fmt: skip
+    ended = [*ending, *((chunk.source, stream.segment, f) for f in found)]
+    facts = (_gaze_fact(after, chunk, now, "applied"), *(_fixation(after, f, now) for f in ended))
+    return _observed(after, now, facts, _result(after, chunk, len(times), told))
 
 
-def _silenced(state: MonitorState) -> tuple[MonitorState, list[tuple[str, Found]]]:
+def _told(state: MonitorState, warnings: list[str]) -> tuple[str, ...]:
+    """A session of format 1 records no warnings."""
+    return tuple(warnings) if state.format > 1 else ()
+
+
+def _result(state: MonitorState, chunk: GazeChunk, accepted: int, warnings: Sequence[str]) -> dict[str, Any]:
+    result: dict[str, Any] = {
+        "accepted": accepted, "source": chunk.source, "seq": chunk.seq, "observation": state.version + 1,
+    }  # fmt: skip
+    return {**result, "warnings": list(warnings)} if warnings else result
+
+
+def _silenced(state: MonitorState) -> tuple[MonitorState, Ending]:
     """The state when no more gaze comes from its source: an open fixation ends."""
     if state.stream is None:
         return state, []
     plan, stream = plan_of(state.study), state.stream
     output = ended(stream.detector, plan.rule)
+    attention, account = dwelt_on(state.attention, stream.account, output, plan)
     after = replace(
         state,
-        attention=interrupted(dwelt_on(state.attention, output, plan)),
-        stream=Stream(stream.source, stream.numbering, stream.last_ns),
+        attention=interrupted(attention),
+        stream=replace(stream, named=None, detector=IDLE, account=account),
         fixations=state.fixations + len(output.found),
     )
-    return after, [(stream.source, f) for f in output.found]
+    return after, [(stream.source, stream.segment, f) for f in output.found]
 
 
 # --- what is refused ---
@@ -297,27 +411,18 @@ def _observed(
 
 
 def _gaze_fact(state: MonitorState, chunk: GazeChunk, now: Stamp, outcome: GazeOutcome) -> Gaze:
-    columns: dict[str, Any]
-    if chunk.aoi is not None:
-        columns = {"aoi": [name or "" for name in chunk.aoi]}
-    else:
-        points = list(points_of(chunk))
-        columns = {
-            "x": [p[0] if p else 0.0 for p in points],
-            "y": [p[1] if p else 0.0 for p in points],
-            "valid": [p is not None for p in points],
-        }
     return Gaze(
-        session=state.session, stamp=now, seen=_seen(state),
-        source=chunk.source, seq=chunk.seq, outcome=outcome, t=chunk.t, **columns,
+        session=state.session, stamp=now, seen=_seen(state), source=chunk.source, seq=chunk.seq,
+        segment=state.stream.segment if state.stream else 0, outcome=outcome, t=chunk.t, **recorded_columns(chunk),
+        warnings=list(state.gaze_warnings),
     )  # fmt: skip
 
 
-def _fixation(state: MonitorState, found: tuple[str, Found], now: Stamp) -> Fixation:
-    source, (start_ns, end_ns, x, y) = found
+def _fixation(state: MonitorState, found: tuple[str, int, Found], now: Stamp) -> Fixation:
+    source, segment, (start_ns, end_ns, x, y) = found
     plan = plan_of(state.study)
     return Fixation(
-        session=state.session, stamp=now, seen=_seen(state), source=source, start_s=start_ns / NS,
+        session=state.session, stamp=now, seen=_seen(state), source=source, segment=segment, start_s=start_ns / NS,
         duration_s=(end_ns - start_ns) / NS, x=x, y=y, aoi=name_of(plan, area_at(plan.areas, x, y)),
     )  # fmt: skip
 

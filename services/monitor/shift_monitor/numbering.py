@@ -1,49 +1,55 @@
-"""Chunk numbers of one gaze source: what is new, a repeat, late, and what never came. Pure."""
+"""Chunk numbers of one segment of a gaze source: what is new, late or a restart, and what never came. Pure.
+
+A segment is what a source sent between two restarts of its clock or its numbering.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-LONGEST_LIST = 64
-"""Chosen: how many gaps are remembered; a late chunk of an older gap is taken for a repeat."""
+OVERTAKEN = 64
+"""Chosen: so many chunks may arrive after the one that began the segment and still be late; before that, a restart."""
 
-Arrival = Literal["new", "repeat", "late"]
+Arrival = Literal["new", "late", "restart"]
 
 
 @dataclass(frozen=True, slots=True)
 class Numbering:
-    """How far a source has been read, and the gaps before that, (first, last) each, oldest first."""
+    """How far a segment has been read."""
 
     last: int = -1
-    gaps: tuple[tuple[int, int], ...] = ()
+    first: int = 0
+    """The number that the segment began with."""
 
 
-def arrival(numbering: Numbering, seq: int) -> Arrival:
-    """What a chunk with this number is."""
+def arrival(numbering: Numbering, seq: int, used: bool, goes_on: bool) -> Arrival:
+    """Return what a chunk with this number is; the caller has seen that it is no repeat.
+
+    Parameters
+    ----------
+    used
+        Whether another chunk of the segment had this number.
+    goes_on
+        Whether the chunk is later, on the source's clock, than all that was read of the segment.
+    """
     if seq > numbering.last:
-        return "new"
-    return "late" if any(first <= seq <= last for first, last in numbering.gaps) else "repeat"
+        return "new" if goes_on else "restart"
+    if used or goes_on or seq < numbering.first - OVERTAKEN:
+        return "restart"
+    return "late"
 
 
 def skipped(numbering: Numbering, seq: int) -> int:
-    """How many chunks are missing before a new one."""
+    """Return how many chunks are missing before a new one."""
     return seq - numbering.last - 1
 
 
 def read(numbering: Numbering, seq: int) -> Numbering:
-    """The numbering after a new chunk."""
-    gap = ((numbering.last + 1, seq - 1),) if skipped(numbering, seq) else ()
-    return Numbering(seq, (*numbering.gaps, *gap)[-LONGEST_LIST:])
+    """Return the numbering after a new chunk."""
+    return Numbering(seq, seq if numbering.last < 0 else numbering.first)
 
 
-def came_late(numbering: Numbering, seq: int) -> Numbering:
-    """The numbering after a late chunk: should it come again, it is a repeat."""
-    gaps: list[tuple[int, int]] = []
-    for first, last in numbering.gaps:
-        if first <= seq <= last:
-            parts = ((first, seq - 1), (seq + 1, last))
-            gaps.extend(part for part in parts if part[0] <= part[1])
-        else:
-            gaps.append((first, last))
-    return Numbering(numbering.last, tuple(gaps[-LONGEST_LIST:]))
+def began_anew(seq: int) -> Numbering:
+    """Return the numbering of a segment that begins with this number: nothing before it counts as missing."""
+    return Numbering(seq - 1, seq)

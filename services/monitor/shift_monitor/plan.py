@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from functools import lru_cache
 from typing import NamedTuple
 
 from shift_schemas.stamps import NS
 from shift_schemas.study import Study
-from shift_schemas.study_text import study_of
+from shift_schemas.study_text import study_from_json
 
 from shift_monitor.areas import NOWHERE, Area, area_of
 from shift_monitor.fixation import Rule, rule_of
@@ -29,7 +28,7 @@ class Plan(NamedTuple):
 @lru_cache(maxsize=256)
 def plan_of(text: str) -> Plan:
     """The study of a ``config`` fact; cached, for it is the same from message to message."""
-    study = study_of(json.loads(text), "config")
+    study = study_from_json(text)
     names = study.aoi_names
     targets: dict[str | None, int] = {None: NOWHERE} | {name: i for i, name in enumerate(names)}
     longest_ns = round(study.attention.maximum_dwell_s * NS)

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from shift_runtime.worker import Core
+from typing import Any
+
+from shift_runtime.worker import Core, Recall
 from shift_schemas.keys import READS
+from shift_schemas.messages import GazeChunk
 
 from shift_monitor import core
 from shift_monitor.core import MonitorState
+from shift_monitor.gaze_input import gaze_input
+
+
+def prepared(message: Any, recall: Recall) -> Any:
+    """Return a chunk of gaze with what was recorded under its number before."""
+    return gaze_input(message, recall) if isinstance(message, GazeChunk) else message
+
 
 CORE: Core[MonitorState] = Core(
     name="monitor",
@@ -14,4 +24,6 @@ CORE: Core[MonitorState] = Core(
     dump=core.dump,
     load=core.load,
     reads=READS["monitor"],
+    prepare=prepared,
+    lookups={"gaze": ("source", "seq")},
 )

@@ -96,16 +96,36 @@ def _start(state: RecorderState | None, command: StartSession, now: Stamp) -> St
     if state is not None:
         raise Conflict(f"session {command.session} is there already, with another content")
     study = study_of(command.study)
+    _check_condition(study, command.condition)
     in_force = study_in_force(study, command.condition)
     fact = Session(
         session=command.session, stamp=now, participant=command.participant, study=study.study,
         condition=command.condition, seed=seed_of(command.session) if command.seed is None else command.seed,
         state="live", started=now, replay_of=command.replay_of,
-        software=command.software, revision=command.revision,
+        software=command.software, revision=command.revision, format=command.format,
+        warnings=_start_warnings(study, command),
     )  # fmt: skip
     config = Config(session=command.session, stamp=now, version=1, study=study_json(in_force))
     original = json.dumps(study_data(study), ensure_ascii=False)
     return Step(RecorderState(fact, config, original), (fact, config), session_answer(fact))
+
+
+def _check_condition(study: Study, condition: str | None) -> None:
+    if condition is None and study.require_condition:
+        rule = f"study {study.study} requires a condition; give one of: {', '.join(study.conditions)}"
+        raise MalformedMessage(f"condition: {rule}", (FieldError(field="condition", value="", rule=rule),))
+
+
+def _start_warnings(study: Study, command: StartSession) -> list[str]:
+    """What is accepted and may not be meant; a session of format 1 records none."""
+    if command.format == 1 or command.condition is not None or not study.conditions:
+        return []
+    known = ", ".join(study.conditions)
+    warning = (
+        f"study {study.study} has the conditions {known} and none was chosen, so this participant is in none of them; "
+        "give one as condition, or write require_condition: true into the study"
+    )
+    return [warning]
 
 
 def _end(state: RecorderState, now: Stamp) -> Step[RecorderState]:

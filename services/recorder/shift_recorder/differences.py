@@ -54,8 +54,8 @@ class Differs(Exception):
 
     @property
     def rank(self) -> tuple[bool, int]:
-        """The smallest is the first difference."""
-        return (not self.missing, self.place)
+        """The smallest is the first difference. All else follows from a configuration: a wrong one comes first."""
+        return (not self.missing and self.difference.subject != "config", self.place)
 
 
 class NotRecorded(Exception):
@@ -98,9 +98,10 @@ def compare(recorded: Placed, derived: Fact) -> None:
 def _plain(fact: Fact) -> dict[str, Any]:
     """The fact's fields; a configuration's study, one string, as the study that it spells.
 
+    Without its warnings: they are advice, and a later version may say them in other words.
     So a recording of an earlier version, whose studies have fewer fields, is as good as one of today.
     """
-    data: dict[str, Any] = fact.model_dump(mode="json")
+    data: dict[str, Any] = fact.model_dump(mode="json", exclude={"warnings"})
     return data | {"study": study_data(study_from_json(fact.study))} if isinstance(fact, Config) else data
 
 

@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 
 from shift_learner import core as learner
 from shift_monitor import core as monitor
+from shift_monitor.gaze_input import Earlier, GazeInput
 from shift_schemas.errors import ShiftError
 from shift_schemas.messages import (
     Fact,
@@ -163,6 +164,11 @@ class MonitorRefold(Refold):
     closing = Observation
     state: monitor.MonitorState
 
+    def __init__(self, inputs: Inputs) -> None:
+        super().__init__(inputs)
+        self._numbers: dict[tuple[str, int], tuple[int, ...]] = {}
+        """Per source and chunk number: the segments in which it was used."""
+
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """See :class:`Refold`."""
         return monitor.step(state, event, now, late=True)
@@ -171,7 +177,7 @@ class MonitorRefold(Refold):
         """Gaze is its own input; of the others exactly one is further than before."""
         first, last = group[0].fact, group[-1]
         if isinstance(first, Gaze):
-            return monitor.gaze_chunk_of(first)
+            return self._gaze_input(first)
         seen = last.fact.seen
         for subject in ("config", "decision", "performance"):
             before: int = getattr(self.state, subject)
@@ -182,6 +188,12 @@ class MonitorRefold(Refold):
         if self.inputs.ending is None or self.state.ended:
             _came_from_nothing(last, self.inputs.complete)
         return self.inputs.ending
+
+    def _gaze_input(self, fact: Gaze) -> GazeInput:
+        """The chunk, and which segments of its source had its number before: by that a restart is told."""
+        used = self._numbers.setdefault((fact.source, fact.seq), ())
+        self._numbers[fact.source, fact.seq] = (*used, fact.segment)
+        return GazeInput(monitor.gaze_chunk_of(fact), tuple(Earlier(segment) for segment in used))
 
     def left(self) -> Iterator[Fact]:
         """See :class:`Refold`."""
@@ -249,10 +261,11 @@ class LearnerRefold(Refold):
 
 
 def _report_of(fact: Performance) -> ReportPerformance:
-    """The command that a performance records."""
+    """The command that a performance records; a correction's own id is not recorded and changes nothing."""
     return ReportPerformance(
         command_id=fact.decision_id,
         session=fact.session,
+        corrects=fact.decision_id if fact.corrects else None,
         comprehension=_result_of(fact.comprehension),
         enabledness=_result_of(fact.enabledness),
     )

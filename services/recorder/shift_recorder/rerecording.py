@@ -24,6 +24,7 @@ from shift_schemas.messages import (
     Session,
     StartSession,
 )
+from shift_schemas.study_text import as_recorded
 
 from shift_recorder.core import RecorderState, ended, step
 from shift_recorder.differences import Difference, Differs, Placed, compare, differ, is_missing
@@ -98,7 +99,7 @@ class Rerecord:
         self.state = RecorderState(start, config, "")
         if self.study is None:
             return
-        derived = step(None, _start_of(start, json.loads(self.study)), start.stamp)
+        derived = step(None, _start_of(start, as_recorded(json.loads(self.study))), start.stamp)
         compare(Placed(placed.place - 1, placed.sequence - 1, start), derived.facts[0])
         compare(placed, derived.facts[1])
 
@@ -138,6 +139,7 @@ def _start_of(start: Session, study: dict[str, Any]) -> StartSession:
     return StartSession(
         command_id=START_ID, session=start.session, participant=start.participant, study=study, seed=start.seed,
         condition=start.condition, replay_of=start.replay_of, software=start.software, revision=start.revision,
+        format=start.format,
     )  # fmt: skip
 
 

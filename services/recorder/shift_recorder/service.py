@@ -125,7 +125,7 @@ class RecorderWorker(Worker[RecorderState]):
 
     # --- commands ---
 
-    def prepare(self, message: Command | GazeChunk) -> Command | GazeChunk:
+    def prepare(self, session: str, message: Command | GazeChunk) -> Any:
         """A start gets its study, and is refused where there is no room for its recording."""
         if not isinstance(message, StartSession):
             return message

@@ -60,11 +60,10 @@ class CommandDoor:
 
     async def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Hand gaze to the monitor; acknowledged once it is in the journal."""
-        view = await self.replica.view(session)
+        await self.replica.view(session)
         answer = await self.mesh.gaze(session, chunk)
-        self._remember(session, answer)
-        view.answered_gaze[chunk.source] = max(view.answered_gaze.get(chunk.source, 0), chunk.seq)
-        return {"accepted": answer.result["accepted"]}
+        self._remember(session, answer, observation=answer.result["observation"])
+        return {name: answer.result[name] for name in ("accepted", "warnings") if name in answer.result}
 
     async def decide(self, session: str, task: str, decision_id: str | None = None) -> tuple[dict[str, Any], bool]:
         """The next decision."""
@@ -80,8 +79,9 @@ class CommandDoor:
         if view.fact.state != "ended":
             await self._check_decision(session, view, body.decision_id)
         command = ReportPerformance(
-            command_id=body.decision_id, session=session, need=view.need,
+            command_id=new_id("c-") if body.corrects else body.decision_id, session=session, need=view.need,
             comprehension=body.comprehension, enabledness=body.enabledness,
+            corrects=body.decision_id if body.corrects else None,
         )  # fmt: skip
         answer = await self.mesh.command(command, wait_s=READ_WAIT_S)
         self._remember(session, answer, performance=answer.result["n"])

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -65,11 +65,22 @@ def digest_of(content: str) -> str:
     return hashlib.sha256(content.encode()).hexdigest()[:32]
 
 
+def _index(subject: str, fields: tuple[str, ...]) -> str:
+    """Names come from the code, never from a message."""
+    columns = "".join(f", json_extract(payload, '$.{name}')" for name in fields)
+    return f"CREATE INDEX IF NOT EXISTS outbox_{subject} ON outbox (session{columns}) WHERE subject = '{subject}'"
+
+
 class Journal:
     """One service's journal. Not for several threads."""
 
-    def __init__(self, path: Path, owner: str) -> None:
+    def __init__(self, path: Path, owner: str, lookups: Mapping[str, tuple[str, ...]] | None = None) -> None:
         """Open or make the file.
+
+        Parameters
+        ----------
+        lookups
+            By subject, the fields by which :meth:`recorded` finds its facts; an index is kept for each.
 
         Raises
         ------
@@ -84,6 +95,8 @@ class Journal:
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
             self._db.executescript(_TABLES)
+            for subject, fields in (lookups or {}).items():
+                self._db.execute(_index(subject, fields))
             self._grow_log()
         except (sqlite3.Error, OSError) as e:
             raise InvalidSettings(f"the journal {path} cannot be opened: {e}; set SHIFT_DATA to a folder for it") from e
@@ -156,6 +169,18 @@ class Journal:
     def closed(self, session: str) -> bool:
         """Whether the session has ended and its recording is finished."""
         return session in self._closed
+
+    def recorded(self, session: str, subject: str, fields: Mapping[str, str | int]) -> list[str]:
+        """Return the session's own facts of a subject whose fields have these values, as JSON, oldest first.
+
+        ``fields`` are those of the subject's look-up, in its order.
+        """
+        where = "".join(f" AND json_extract(payload, '$.{name}') = ?" for name in fields)
+        rows = self._db.execute(
+            f"SELECT payload FROM outbox WHERE session = ? AND subject = '{subject}'{where} ORDER BY seq",
+            (session, *fields.values()),
+        )
+        return [payload for (payload,) in rows]
 
     # --- writing ---
 

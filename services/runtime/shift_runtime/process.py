@@ -55,7 +55,7 @@ def leave() -> NoReturn:
 
 async def serve(core: Core[Any], settings: MeshSettings, kind: WorkerKind = Worker) -> None:
     """The service on its bus, until a signal."""
-    journal = Journal(settings.data / "state" / f"{core.name}.sqlite", core.name)
+    journal = Journal(settings.data / "state" / f"{core.name}.sqlite", core.name, core.lookups)
     bus = await ZenohBus.open(settings.zenoh, settings.listen)
     extra = {} if kind is Worker else {"settings": settings}
     worker = kind(core, bus, journal, SystemClock(), Metrics(core.name), **extra)

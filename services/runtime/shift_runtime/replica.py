@@ -50,7 +50,6 @@ class View:
     counts: Counter[str] = field(default_factory=Counter)
     answered: Counter[str] = field(default_factory=Counter)
     """What this door has answered, as :class:`Seen` counts it: it is in everything that it answers afterwards."""
-    answered_gaze: dict[str, int] = field(default_factory=dict)
     sequences: dict[str, int] = field(default_factory=dict)
     """Per owner, the sequence that its last answer named."""
     listeners: list[Listener] = field(default_factory=list)
@@ -66,12 +65,12 @@ class View:
     @property
     def need(self) -> Seen:
         """What an answer must have in it: what this door answered, and what it has read."""
-        answered, read = self.answered, self.observation.seen.gaze if self.observation else {}
+        answered = self.answered
         return Seen(
-            gaze={s: max(n, read.get(s, n)) for s, n in (read | self.answered_gaze).items()},
             decision=max(answered["decision"], self.n),
             performance=max(answered["performance"], self.performances),
             config=max(answered["config"], self.config.version if self.config else 1),
+            observation=max(answered["observation"], self.observation.version if self.observation else 0),
         )
 
 

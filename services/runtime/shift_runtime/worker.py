@@ -13,6 +13,7 @@ import json
 from collections import deque
 from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Generic, Protocol, TypeVar
 
 import structlog
@@ -66,6 +67,13 @@ STREAM_LIMIT = 5_000
 """Chunks that may wait; more are dropped and counted."""
 
 
+class Recall(Protocol):
+    """Finds facts of the session that the service itself put out, by its look-ups."""
+
+    def __call__(self, subject: str, **fields: str | int) -> list[Fact]:
+        """Return them, oldest first."""
+
+
 class CoreStep(Protocol[S]):
     """A core's fold."""
 
@@ -81,6 +89,10 @@ class Core(Generic[S]):
     dump: Callable[[S], str]
     load: Callable[[str], S]
     reads: Mapping[str, frozenset[str]]
+    prepare: Callable[[Any, Recall], Any] = lambda message, recall: message
+    """What a command or a chunk is stepped as, given what was recorded before."""
+    lookups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """By subject of its own, the fields by which ``recall`` finds facts."""
 
 
 @dataclass
@@ -189,9 +201,19 @@ class Worker(Generic[S]):
     async def on_stop(self) -> None:
         """A place for a service's own tidying."""
 
-    def prepare(self, message: Command | GazeChunk) -> Command | GazeChunk:
+    def prepare(self, session: str, message: Command | GazeChunk) -> Any:
         """A place for what a command needs of the world before the pure core can carry it out."""
-        return message
+        return self.core.prepare(message, partial(self._recall, session))
+
+    def _recall(self, session: str, subject: str, **fields: str | int) -> list[Fact]:
+        kept = [decode(FACTS[subject], text) for text in self.journal.recorded(session, subject, fields)]
+        of_this_turn = [
+            fact
+            for row, fact in self._open.facts
+            if (row.session, row.subject) == (session, subject)
+            and all(getattr(fact, name) == value for name, value in fields.items())
+        ]
+        return [*kept, *of_this_turn]
 
     @property
     def ready(self) -> bool:
@@ -365,7 +387,7 @@ class Worker(Generic[S]):
             if found is not None:
                 turn.answers.append((asked, _Told(found, self._head(turn, asked.session), repeat=True)))
                 return
-            message = self.prepare(asked.message)
+            message = self.prepare(asked.session, asked.message)
             step = self.core.step(self._state(asked.session), message, self.clock.now(), late=asked.late)
         except NotYet as e:
             self._wait(asked, e)
@@ -398,7 +420,7 @@ class Worker(Generic[S]):
             result, seq = json.dumps(step.result), 0
         if asked.key is not None and isinstance(asked.message, Command):
             turn.batch.answers[asked.key] = StoredAnswer(digest_of(asked.message.content()), result, seq)
-        turn.answers.append((asked, _Told(result, self._head(turn, asked.session))))
+        turn.answers.append((asked, _Told(result, self._head(turn, asked.session), step.repeat)))
 
     def _refuse(self, turn: _Turn, asked: Asked, error: ShiftError) -> None:
         turn.refusals.append((asked, error))

@@ -14,6 +14,7 @@ from shift_decider import core as decider
 from shift_learner import core as learner
 from shift_monitor import core as monitor
 from shift_schemas.messages import (
+    FORMAT,
     Config,
     Decide,
     Decision,
@@ -78,7 +79,7 @@ class Mesh:
         self._chunks = 0
         start = Session(
             session=SESSION, stamp=self._now, participant="P00", study=self.study.study, seed=self.seed,
-            state="live", started=self._now,
+            state="live", started=self._now, format=FORMAT,
         )  # fmt: skip
         self._pass_on(start)
         self._pass_on(Config(session=SESSION, stamp=self._now, version=1, study=study_json(self.study)))

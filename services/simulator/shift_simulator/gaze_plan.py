@@ -124,7 +124,8 @@ def _attention(study: Study, view: GazeView) -> Attention:
     """Attention after the lead on nothing that each chunk begins with."""
     held = study.aoi_names.index(view.aoi) if view.aoi else NOWHERE
     weights = tuple(view.weights[name] for name in study.aoi_names)
-    return Attention(weights, view.focus_shift, held, NOWHERE, LEAD_NS, 0, met=True)
+    dwell_ns = round((view.dwell_s or 0.0) * NS)
+    return Attention(weights, view.focus_shift, held, NOWHERE, LEAD_NS, 0, met=True, dwell_ns=dwell_ns)
 
 
 def _hold_ns(study: Study) -> int:

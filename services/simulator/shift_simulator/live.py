@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from shift_runtime.rest_client import RestClient
 from shift_schemas.messages import GazeView
 from shift_schemas.study import Study
-from shift_schemas.study_text import study_of
+from shift_schemas.study_text import as_recorded, study_of
 from shift_schemas.words import Triple
 
 from shift_simulator.gaze_plan import chunk_of, plan_gaze
@@ -31,7 +31,7 @@ class LiveEpisode(NamedTuple):
 def study_at(shift: RestClient, session: str) -> Study:
     """The study in force."""
     config = shift.config(session)
-    return study_of({k: v for k, v in config.items() if k != "version"})
+    return study_of(as_recorded({k: v for k, v in config.items() if k != "version"}))
 
 
 def drive(shift: RestClient, session: str, user: User, episodes: int) -> Iterator[LiveEpisode]:

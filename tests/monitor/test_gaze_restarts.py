@@ -1,0 +1,133 @@
+"""Gaze that begins anew: a tracker's program that was started again, a clock that was set, a glitch of one sample."""
+
+from __future__ import annotations
+
+import pytest
+from monitor_sessions import NOW, Recorded, began, fixations, fold, last, names, points, session
+from shift_monitor.core import MonitorState, dump, load, step
+from shift_monitor.gaze_input import gaze_input
+from shift_schemas.errors import MalformedMessage
+from shift_schemas.messages import Gaze, GazeChunk, Observation
+
+
+def look(seq: int, start_s: float, x: float) -> GazeChunk:
+    """Fifty milliseconds of steady gaze at 100 Hz."""
+    return points(seq, [round(start_s + i / 100, 6) for i in range(5)], [x] * 5, source="tx300")
+
+
+def looks(first: int, start_s: float, x: float, n: int) -> list[GazeChunk]:
+    return [look(first + i, round(start_s + i * 0.05, 6), x) for i in range(n)]
+
+
+def gaze(facts: list[object]) -> list[Gaze]:
+    return [f for f in facts if isinstance(f, Gaze)]
+
+
+def test_a_tracker_that_begins_its_numbers_again_goes_on_and_every_chunk_is_recorded() -> None:
+    recorded = Recorded()
+    state, before = fold(began(), *looks(0, 100.0, 0.1, 200), recorded=recorded)
+    _, after = fold(state, *looks(0, 110.0, 0.9, 200), recorded=recorded)
+    assert last(before).gaze.aoi == "left"
+    assert last(after).gaze.aoi == "right"
+    assert (last(after).gaze.restarts, last(after).gaze.dropped, last(after).gaze.samples) == (1, 0, 2000)
+    assert [(g.seq, g.segment, g.outcome) for g in gaze(after)] == [(n, 1, "applied") for n in range(200)]
+    assert gaze(after)[0].warnings == [
+        "gaze source tx300 sends another chunk 0 after chunk 199: segment 1 of the source begins"
+    ]
+    assert gaze(after)[1].warnings == []
+
+
+@pytest.mark.parametrize(("before_s", "after_s"), [(3600.0, 0.0), (74701.0, 34.0), (1764000000.0, 1763999999.0)])
+def test_a_clock_that_goes_back_is_a_restart_while_the_numbers_go_on(before_s: float, after_s: float) -> None:
+    state, _ = fold(began(), *looks(0, before_s, 0.1, 20))
+    _, facts = fold(state, *looks(20, after_s, 0.9, 60))
+    assert last(facts).gaze.restarts == 1
+    assert last(facts).gaze.aoi == "right"
+    assert len(gaze(facts)) == 60
+    assert "goes back from" in gaze(facts)[0].warnings[0]
+
+
+def test_one_glitch_far_in_the_future_is_counted_and_the_next_chunk_is_taken() -> None:
+    state, _ = fold(began(), *looks(0, 10.0, 0.1, 20))
+    state, jumped = fold(state, points(20, [1.7e9], [0.5], source="tx300"))
+    assert "jumps forward" in gaze(jumped)[0].warnings[0]
+    _, facts = fold(state, *looks(21, 11.0, 0.9, 60))
+    view = last(facts).gaze
+    assert (view.restarts, view.aoi) == (1, "right")
+    assert view.lost == pytest.approx(0.0, abs=0.02)  # a jump is no time
+
+
+def test_a_glitch_of_the_numbers_is_no_dead_end_either() -> None:
+    state, _ = fold(began(), look(0, 0.0, 0.1), look(2**40, 0.05, 0.1))
+    _, facts = fold(state, *looks(1, 0.1, 0.9, 60))
+    assert (last(facts).gaze.restarts, last(facts).gaze.aoi) == (1, "right")
+
+
+def test_a_clock_that_jumps_forward_an_hour_goes_on_without_dwell_in_between() -> None:
+    state, before = fold(began(), *looks(0, 10.0, 0.1, 20))
+    _, facts = fold(state, *looks(20, 3611.0, 0.1, 20))
+    assert last(facts).gaze.restarts == 0
+    dwell_s, before_s = last(facts).gaze.dwell_s, last(before).gaze.dwell_s
+    assert dwell_s is not None
+    assert before_s is not None
+    assert dwell_s - before_s == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_restart_ends_the_open_fixation_in_its_own_segment() -> None:
+    recorded = Recorded()
+    state, _ = fold(began(), *looks(0, 100.0, 0.1, 10), recorded=recorded)
+    _, facts = fold(state, *looks(0, 0.0, 0.9, 10), session("ending"), recorded=recorded)
+    assert [(f.segment, f.aoi) for f in fixations(facts)] == [(0, "left"), (1, "right")]
+
+
+def test_the_same_content_is_a_repeat_however_long_ago_and_across_a_restart() -> None:
+    recorded = Recorded()
+    state, _ = fold(began(), *looks(0, 0.0, 0.1, 300), *looks(0, 15.0, 0.9, 10), recorded=recorded)
+    for chunk in (look(0, 0.0, 0.1), look(299, 14.95, 0.1), look(5, 15.25, 0.9)):
+        again = step(state, gaze_input(chunk, recorded), NOW)
+        assert (again.state, again.facts, again.repeat) == (state, (), True)
+        assert isinstance(again.result, dict)
+        assert again.result["accepted"] == 5
+
+
+def test_a_late_chunk_after_a_restart_belongs_to_the_new_segment() -> None:
+    recorded = Recorded()
+    state, _ = fold(began(), *looks(0, 0.0, 0.1, 10), recorded=recorded)
+    state, _ = fold(state, look(0, 10.0, 0.9), look(2, 10.1, 0.9), recorded=recorded)
+    _, facts = fold(state, look(1, 10.05, 0.9), recorded=recorded)
+    (late,) = gaze(facts)
+    assert (late.outcome, late.segment) == ("late", 1)
+
+
+def test_numbers_far_below_the_first_one_are_a_restart_and_not_late_for_ever() -> None:
+    state, _ = fold(began(), *looks(1000, 100.0, 0.1, 20))
+    _, facts = fold(state, *looks(0, 0.0, 0.9, 60))
+    assert (last(facts).gaze.restarts, last(facts).gaze.aoi) == (1, "right")
+
+
+def test_a_sample_at_the_very_time_of_the_last_one_is_refused_and_says_so() -> None:
+    state, _ = fold(began(), points(0, [1.0, 1.01, 1.02], [0.5] * 3))
+    with pytest.raises(MalformedMessage, match=r"t must rise by 1 ns or more; the sample before was at 1\.02 s"):
+        step(state, points(1, [1.02, 1.03], [0.5] * 2), NOW)
+
+
+def test_a_session_of_the_first_format_takes_restarts_and_records_what_it_did_then() -> None:
+    state = step(None, session().model_copy(update={"format": 1}), NOW).state
+    state, facts = fold(MonitorState(**{**vars_of(began()), "format": state.format}), *looks(0, 5.0, 0.1, 5))
+    state, facts = fold(state, *looks(5, 0.0, 0.9, 60))
+    observation = facts[-1]
+    assert isinstance(observation, Observation)
+    assert observation.gaze.aoi == "right"
+    assert (observation.gaze.restarts, observation.gaze.lost, observation.warnings) == (None, None, [])
+    assert load(dump(state)) == state
+
+
+def vars_of(state: MonitorState) -> dict[str, object]:
+    return {name: getattr(state, name) for name in state.__slots__}
+
+
+def test_names_can_begin_anew_as_well() -> None:
+    recorded = Recorded()
+    state, _ = fold(began(), names(0, [0.0, 1.0], ["left", "left"]), recorded=recorded)
+    _, facts = fold(state, names(0, [0.5, 1.5], ["right", "right"]), recorded=recorded)
+    assert (last(facts).gaze.restarts, last(facts).gaze.aoi) == (1, "right")
