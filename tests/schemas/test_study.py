@@ -170,11 +170,11 @@ def test_parts_that_do_not_fit_together_are_named_with_their_values() -> None:
         ("aois: [{name: a}]", 2, "either rectangle"),
         ("aois:\n- &a {name: a, rectangle: [0, 0, 1, 1]}\n- *a", 2, "AOI names must differ"),
         ("aois: [{name: a, polygon: [[0, 0], [1, 1]]}]", 2, "it has 2 entries and needs at least 3"),
-        ("aois: [{name: a, rectangle: [0, 0, 1, 1.5]}]", 2, "it must be at most 1; it is a share of the stimulus' height"),
+        ("aois: [{name: a, rectangle: [0, 0, 1, 1.5]}]", 2, "it is a share of the stimulus' height"),
         ("conditions:\n  a: {tasks: [x]}", 3, "overrides tasks; it can override attention"),
         ("conditions:\n  a:\n    reward: {decay: -1}", 4, "conditions.a.reward.decay: '-1' is not valid"),
         ("conditions: {'a/b': {}}", 2, "'a/b' is not an id: 1 to 63 letters"),
-        ("scoring: {strategies: {p: {levels: [a, b], thresholds: [0.5]}}}", 2, "scoring.table.capacity.low.p: it is missing; write 0 or 1 for p"),
+        ("scoring: {strategies: {p: {levels: [a, b], thresholds: [0.5]}}}", 2, "capacity.low.p: it is missing; write"),
     ):  # fmt: skip
         with pytest.raises(InvalidStudy) as refused:
             parse_study(f"study: x\n{text}", "mine.yaml")
