@@ -253,23 +253,18 @@ class ScoringSettings(_Part):
             raise ValueError(f"the levels make {actions} actions; at most 64 can be learned about")
         return self
 
-    def _wrong_cells(self) -> list[tuple[tuple[str, ...], str]]:
-        """Path and rule of each cell that the table lacks, or has for no strategy of the study."""
-        cells: list[tuple[tuple[str, ...], str]] = []
+    def _wrong_cells(self) -> list[tuple[tuple[str, ...], str, str]]:
+        """Path, what stands there, and rule of each cell that is missing or belongs to no strategy of the study."""
+        cells: list[tuple[tuple[str, ...], str, str]] = []
         names = ", ".join(self.strategies)
         for part in ScoringTable.model_fields:
             for category, row in getattr(self.table, part):
-                row_path = ("table", part, category)
+                path = ("table", part, category)
                 missing = [name for name in self.strategies if name not in row]
-                cells += [((*row_path, name), f"it is missing; write 0 or 1 for {name}") for name in missing]
-                cells += [
-                    (
-                        (*row_path, name),
-                        f"{name!r} is not a strategy; write one of {names}{did_you_mean(name, missing)}",
-                    )
-                    for name in row
-                    if name not in self.strategies
-                ]
+                cells += [((*path, name), "", f"it is missing; write 0 or 1 for {name}") for name in missing]
+                for name in (name for name in row if name not in self.strategies):
+                    rule = f"{name!r} is not a strategy; write one of {names}{did_you_mean(name, missing)}"
+                    cells.append(((*path, name), name, rule))
         return cells
 
     @cached_property

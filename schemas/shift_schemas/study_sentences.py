@@ -56,8 +56,8 @@ def mistakes_of(found: Any, lines: Lines, under: Path) -> Iterator[Mistake]:
     """Yield the mistakes in one complaint of pydantic's about what stands ``under`` a condition, or at the top."""
     path: Path = tuple(p for p in found["loc"] if p != "[key]")
     if found["type"] == "table_cells":
-        for cell, rule in found["ctx"]["cells"]:
-            yield _placed((*path, *cell), cell[-1] if len(cell) == 4 else "", rule, lines, under)
+        for cell, value, rule in found["ctx"]["cells"]:
+            yield _placed((*path, *cell), value, rule, lines, under)
         return
     path = path or _named_first(found["msg"])
     value = "" if found["type"] == "missing" else shorten(found["input"])
@@ -108,7 +108,7 @@ def _plain_rule(found: Any, path: Path, given: Any) -> str:
             if _is_number(given)
             else "write a word or a text"
         )
-    if found["type"] == "int_from_float" and float(given).is_integer():
+    if found["type"] in ("int_type", "int_from_float") and isinstance(given, float) and given.is_integer():
         return f"it must be a whole number; write {int(given)}"
     if expected == "list" and "length" not in (found.get("ctx") or {}) and not isinstance(given, list):
         return _list_rule(path, given)
@@ -244,9 +244,10 @@ def _share_rule(path: Path, given: float) -> str:
     if shape is None:
         return percent or "it is a share of one"
     side = "width" if int(path[-1]) % 2 == 0 else "height"
-    pixels = f"{given:g} pixels are {given:g} divided by the stimulus' {side} in pixels"
+    pixels = f"{given:g} pixels are {given:g} divided by the stimulus' {side} in pixels" if given >= 2 else ""
     comma = f"0,{given} is written 0.{given}" if isinstance(given, int) and 1 < given < 10 else ""
-    return f"it is a share of the stimulus' {side}: {', '.join(part for part in (comma, percent, pixels) if part)}"
+    meant = ", ".join(part for part in (comma, percent, pixels) if part)
+    return f"it is a share of the stimulus' {side}" + (f": {meant}" if meant else "")
 
 
 def _default(path: Path) -> str:

@@ -147,10 +147,11 @@ class _Reading:
         kind = kind_at(path)
         if kind == "any":
             return None  # an unknown key: that is said
-        if kind == "mapping" and not in_condition and not strategy:
+        if kind == "mapping" and isinstance(path[-1], str) and not in_condition and not strategy:
             return {}
         null = "; null takes it out again" if in_condition or strategy else ""
-        self._mistake(node, path, f"nothing is written here; write a value, or remove the key{null}")
+        rule = f"nothing is written here; write a value, or remove the key{null}"
+        self.mistakes.append(mistake_at(self.lines.get(path, _line(node)), path, "", rule))
         return None
 
     def _check_commas(self, node: MappingNode, path: Path) -> None:
