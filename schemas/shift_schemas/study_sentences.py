@@ -17,6 +17,8 @@ from shift_schemas.yaml_core import core_number
 Lines = dict[Path, int]
 RULE_LENGTH = 400
 """How much of a rule is said: rules name what is there, and that can be as long as what was sent."""
+MISTAKES = 20
+"""So many are said at once."""
 LEVEL_RULE = "1 to 32 lower-case letters, digits and _, beginning with a letter"
 
 
@@ -46,10 +48,10 @@ def mistake_at(line: int | None, path: Path, value: object, rule: str) -> Mistak
 
 
 def refusal(name: str, mistakes: Iterable[Mistake]) -> InvalidStudy:
-    """Return the error that says all mistakes; ``name`` is the file's."""
-    sorted_ = sorted(dict.fromkeys(mistakes), key=lambda m: m.line or 0)[:20]
-    sentences = tuple(m.said(name) for m in sorted_)
-    return InvalidStudy("; ".join(sentences), tuple(m.error for m in sorted_), sentences)
+    """Return the error that says the mistakes in the order of their lines; ``name`` is the file's."""
+    said = sorted(dict.fromkeys(mistakes), key=lambda m: m.line or 0)[:MISTAKES]
+    sentences = tuple(m.said(name) for m in said)
+    return InvalidStudy("; ".join(sentences), tuple(m.error for m in said), sentences)
 
 
 def mistakes_of(found: Any, lines: Lines, under: Path) -> Iterator[Mistake]:
@@ -99,18 +101,16 @@ def _rule(found: Any, path: Path, value: str) -> str:
 def _plain_rule(found: Any, path: Path, given: Any) -> str:
     expected = kind_at(path)
     if expected == "number" and isinstance(given, str):
-        return number_rule(given, path)
+        return _number_rule(given, path)
     if expected == "boolean":
         return _boolean_rule(given)
+    if expected == "text" and _is_number(given):
+        return f"it is not text; write {json.dumps(str(given))} in quotes"
     if expected == "text" and not isinstance(given, str):
-        return (
-            f"it is not text; write {json.dumps(str(given))} in quotes"
-            if _is_number(given)
-            else "write a word or a text"
-        )
+        return "write a word or a text"
     if found["type"] in ("int_type", "int_from_float") and isinstance(given, float) and given.is_integer():
         return f"it must be a whole number; write {int(given)}"
-    if expected == "list" and "length" not in (found.get("ctx") or {}) and not isinstance(given, list):
+    if expected == "list" and not isinstance(given, list):
         return _list_rule(path, given)
     if found["type"] in ("model_type", "model_attributes_type", "dict_type"):
         return _mapping_rule(path, given)
@@ -137,8 +137,8 @@ def _word_rule(pattern: str, given: str) -> str:
     return f"{shorten(given)!r} is not {what}: {rule}{proposal}"
 
 
-def number_rule(text: str, path: Path) -> str:
-    """Return what to write instead of ``text`` where a number is expected."""
+def _number_rule(text: str, path: Path) -> str:
+    """What to write instead of ``text`` where a number is expected."""
     bare = text.strip().replace("−", "-")
     if core_number(bare) is not None:
         return f"it is text and a number is expected; write {bare} without quotes"

@@ -15,12 +15,9 @@ from shift_schemas.area_checks import area_mistakes
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
 from shift_schemas.hints import did_you_mean
 from shift_schemas.study import DEFAULT_STRATEGIES, DEFAULT_TABLE, Study, merge_patch
-from shift_schemas.study_sentences import Lines, Mistake, mistakes_of, refusal
+from shift_schemas.study_sentences import MISTAKES, Lines, Mistake, mistakes_of, refusal
 from shift_schemas.study_shape import Path
 from shift_schemas.study_yaml import read_yaml
-
-MISTAKES = 20
-"""So many are said at once."""
 
 
 def parse_study(text: str, name: str = "study") -> Study:

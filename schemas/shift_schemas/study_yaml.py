@@ -32,7 +32,7 @@ _TAGS = frozenset(
     f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null", "map", "seq", "merge", "timestamp")
 )
 """Tags that repeat what the place says already."""
-_DIGITS = re.compile(r"[0-9]+%?")
+_DIGITS = re.compile(r"[0-9]+")
 
 
 def read_yaml(text: str, name: str) -> tuple[Any, Lines]:
@@ -45,9 +45,7 @@ def read_yaml(text: str, name: str) -> tuple[Any, Lines]:
     """
     node = _composed(text.removeprefix("\ufeff"), name)
     if not isinstance(node, MappingNode):
-        what = (
-            "the file is empty" if node is None else f"this is a {'list' if isinstance(node, SequenceNode) else 'text'}"
-        )
+        what = "the file is empty" if node is None else "this is a list or a text"
         raise refusal(name, [Mistake(1, "", "", f"a study is a mapping and {what}; begin with 'study: my-study'")])
     reading = _Reading()
     try:
@@ -112,6 +110,7 @@ class _Reading:
 
     def _pairs(self, node: MappingNode, path: Path, depth: int) -> Iterator[tuple[Node, Node, bool]]:
         """Keys and values, those of merged mappings (``<<: *base``) first; what stands here overrides them."""
+        self._count(path)
         if depth > DEEPEST:
             raise _TooMuch("an anchor merges itself; write the values out")
         for key, value in node.value:
@@ -163,7 +162,7 @@ class _Reading:
                 continue
             self.mistakes = [m for m in self.mistakes if m.field != dotted((*path, following.value))]
             written = f"{value.value},{following.value}"
-            rule = f"the comma ends the entry here; write {written.replace(',', '.')} with a point"
+            rule = f"'{written}' is not valid: the comma ends the entry; write {written.replace(',', '.')} with a point"
             self.mistakes.append(mistake_at(_line(value), (*path, str(key.value)), written, rule))
 
     def _mistake(self, node: Node, path: Path, rule: str) -> None:

@@ -66,6 +66,11 @@ def test_a_few_lines_cannot_spell_billions() -> None:
     assert f"more than {LARGEST} entries" in refusal(laughs + "study: x")
 
 
+def test_a_few_lines_cannot_merge_billions() -> None:
+    merges = "a0: &a0 {}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 9)}]}}\n" for i in range(1, 12))
+    assert f"more than {LARGEST} entries" in refusal(merges + "study: x")
+
+
 def test_an_alias_is_what_it_stands_for() -> None:
     study = parse_study("study: x\nreward: &r {decay: 0.2}\nconditions: {same: {reward: *r}}")
     assert study.conditions == {"same": {"reward": {"decay": 0.2}}}

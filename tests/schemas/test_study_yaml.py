@@ -76,7 +76,7 @@ def test_every_mistake_of_the_text_is_said_at_once() -> None:
     said = refusal("tasks: [a]\ntasks: [b]\naois:\nlearner: {epsilon: 0,75}\n")
     assert "mine.yaml:3: tasks: it is given twice" in said
     assert "mine.yaml:4: aois: nothing is written here" in said
-    assert "mine.yaml:5: learner.epsilon: the comma ends the entry here; write 0.75 with a point" in said
+    assert "mine.yaml:5: learner.epsilon: '0,75' is not valid: the comma ends the entry; write 0.75" in said
 
 
 # --- numbers and booleans ---
@@ -113,7 +113,7 @@ def test_a_leading_zero_makes_no_octal_number() -> None:
      ("fixation: {distance_cm: 1:05}", "'1:05' is not valid: a number has no colon; write one number, in cm"),
      ("fixation: {distance_cm: 65 cm}", "'65 cm' is not valid: write the number alone, 65, in cm"),
      ("fixation:\n  distance_cm: 65,5", "'65,5' is not valid: a number has a point, not a comma; write 65.5"),
-     ("learner: {epsilon: 0,75}", "learner.epsilon: the comma ends the entry here; write 0.75 with a point"),
+     ("learner: {epsilon: 0,75}", "learner.epsilon: '0,75' is not valid: the comma ends the entry; write 0.75"),
      ("learner: {epsilon: 75%}", "'75%' is not valid: write the share of one without the sign, 0.75"),
      ("learner: {epsilon: '0.75'}", "it is text and a number is expected; write 0.75 without quotes"),
      ("learner: {epsilon: 75}", "'75' is not valid: it must be at most 1; 75 % is written 0.75"),
