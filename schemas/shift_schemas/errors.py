@@ -52,6 +52,13 @@ class InvalidStudy(MalformedMessage):
     kind = "invalid-study"
     title = "The study has a mistake"
 
+    def __init__(
+        self, detail: str, errors: tuple[FieldError, ...] = (), sentences: tuple[str, ...] | None = None
+    ) -> None:
+        super().__init__(detail, errors)
+        self.sentences = sentences or (detail,)
+        """One sentence per mistake, each with file and line where the study is a file."""
+
 
 class UnknownThing(ShiftError):
     """A session, task, decision or recording that is not there."""

@@ -11,7 +11,9 @@ from itertools import product
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
+from shift_schemas.hints import did_you_mean
 from shift_schemas.ids import Id
 from shift_schemas.words import (
     LearnerName,
@@ -46,9 +48,7 @@ class Aoi(_Part):
         if (self.rectangle is None) == (self.polygon is None):
             raise ValueError("give either rectangle: [left, top, right, bottom] or polygon: [[x, y], ...]")
         if self.rectangle and not (self.rectangle[0] < self.rectangle[2] and self.rectangle[1] < self.rectangle[3]):
-            raise ValueError(
-                f"rectangle is left, top, right, bottom: left < right and top < bottom; it is {self.rectangle}"
-            )
+            raise ValueError(_not_left_top_right_bottom(self.name, self.rectangle))
         return self
 
 
@@ -247,21 +247,28 @@ class ScoringSettings(_Part):
 
     @model_validator(mode="after")
     def _complete(self) -> ScoringSettings:
-        names = set(self.strategies)
-        for part in (self.table.capacity, self.table.gaze, self.table.awareness):
-            for category in type(part).model_fields:
-                row: Row = getattr(part, category)
-                if set(row) != names:
-                    raise ValueError(
-                        f"row {category} of the table needs a 0 or 1 for each of {', '.join(self.strategies)}; "
-                        f"it has {', '.join(row) or 'none'}"
-                    )
+        if cells := self._wrong_cells():
+            raise PydanticCustomError("table_cells", "the table does not fit the strategies", {"cells": cells})
         actions = 1
         for strategy in self.strategies.values():
             actions *= len(strategy.levels)
         if actions > 64:
             raise ValueError(f"the levels make {actions} actions; at most 64 can be learned about")
         return self
+
+    def _wrong_cells(self) -> list[tuple[tuple[str, ...], str, str]]:
+        """Path, what stands there, and rule of each cell that is missing or belongs to no strategy of the study."""
+        cells: list[tuple[tuple[str, ...], str, str]] = []
+        names = ", ".join(self.strategies)
+        for part in ScoringTable.model_fields:
+            for category, row in getattr(self.table, part):
+                path = ("table", part, category)
+                missing = [name for name in self.strategies if name not in row]
+                cells += [((*path, name), "", f"it is missing; write 0 or 1 for {name}") for name in missing]
+                for name in (name for name in row if name not in self.strategies):
+                    rule = f"{name!r} is not a strategy; write one of {names}{did_you_mean(name, missing)}"
+                    cells.append(((*path, name), name, rule))
+        return cells
 
     @cached_property
     def actions(self) -> tuple[tuple[str, ...], ...]:
@@ -364,14 +371,14 @@ class Study(_Part):
     @classmethod
     def _tasks_differ(cls, tasks: list[str] | None) -> list[str] | None:
         if tasks is not None and len(set(tasks)) != len(tasks):
-            raise ValueError("tasks must differ")
+            raise ValueError(f"tasks must differ; {_twice(tasks)} is there twice")
         return tasks
 
     @field_validator("aois")
     @classmethod
     def _aois_differ(cls, aois: list[Aoi]) -> list[Aoi]:
         if len({a.name for a in aois}) != len(aois):
-            raise ValueError("AOI names must differ")
+            raise ValueError(f"AOI names must differ; {_twice([a.name for a in aois])} is there twice")
         return aois
 
     @model_validator(mode="after")
@@ -456,3 +463,16 @@ def _columns(table: dict[str, dict[str, dict[str, float]]], strategies: Any) -> 
         part: {category: {s: v for s, v in row.items() if s in strategies} for category, row in rows.items()}
         for part, rows in table.items()
     }
+
+
+def _twice(names: list[str]) -> str:
+    return next(name for i, name in enumerate(names) if name in names[:i])
+
+
+def _not_left_top_right_bottom(name: str, rectangle: list[float]) -> str:
+    left, top, width, height = rectangle
+    said = f"rectangle of {name} is left, top, right, bottom: left < right and top < bottom; it is {rectangle}"
+    if left + width <= 1 and top + height <= 1 and width > 0 and height > 0:
+        meant = f"[{left:g}, {top:g}, {left + width:g}, {top + height:g}]"
+        return f"{said}; if left, top, width, height are meant, write {meant}"
+    return said

@@ -5,84 +5,68 @@ A mistake gives file, line, the value, the rule and what to write instead.
 
 from __future__ import annotations
 
-import difflib
 import json
-import re
-from collections.abc import Iterator
 from functools import lru_cache
-from itertools import islice
-from typing import Any, get_args, get_origin
+from typing import Any
 
-import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
+from shift_schemas.area_checks import area_mistakes
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
+from shift_schemas.hints import did_you_mean
 from shift_schemas.study import DEFAULT_STRATEGIES, DEFAULT_TABLE, Study, merge_patch
-
-Path = tuple[str | int, ...]
-Lines = dict[Path, int]
-LARGEST = 50_000
-"""Entries of a study file, aliases counted each time: a few lines of YAML can spell billions of them."""
-RULE_LENGTH = 400
-"""How much of a rule is said: rules name what is there, and that can be as long as what was sent."""
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML 1.1's safe loader, and numbers as JSON writes them: 1e-05 has no point."""
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float", re.compile(r"[-+]?[0-9]+(?:\.[0-9]*)?[eE][-+]?[0-9]+\Z"), list("-+0123456789")
-)
+from shift_schemas.study_sentences import MISTAKES, Lines, Mistake, mistakes_of, refusal
+from shift_schemas.study_shape import Path
+from shift_schemas.study_yaml import read_yaml
 
 
 def parse_study(text: str, name: str = "study") -> Study:
-    """The study that ``text`` spells, YAML or JSON; ``name`` is the file's, for the message.
+    """Return the study that ``text`` spells, YAML or JSON; ``name`` is the file's, for the message.
 
     Raises
     ------
     InvalidStudy
         With one field error per mistake; the message gives ``file:line``.
     """
-    try:
-        node = yaml.compose(text, Loader=_Loader)
-    except (yaml.YAMLError, RecursionError) as e:
-        mark = getattr(e, "problem_mark", None)
-        where = f"{name}:{mark.line + 1}" if mark else name
-        raise InvalidStudy(f"{where}: this is not YAML: {_problem_of(e) or 'it is nested too deep'}") from e
-    if not isinstance(node, yaml.MappingNode):
-        raise InvalidStudy(f"{name}:1: a study is a mapping; begin with 'study: my-study'")
-    lines: Lines = {}
-    for path, line, twice in islice(_walk(node, (), 0), LARGEST + 1):
-        if twice:
-            raise InvalidStudy(f"{name}:{line}: {_dotted(path)} is given twice; keep one of the two")
-        lines[path] = line
-    if len(lines) > LARGEST:
-        raise InvalidStudy(
-            f"{name}: it has more than {LARGEST} entries, aliases counted each time; write a smaller one"
-        )
-    return study_of(_constructed(text, name), name, lines)
+    data, lines = read_yaml(text, name)
+    return checked(study_of(data, name, lines), name, lines)
 
 
-def _constructed(text: str, name: str) -> Any:
-    try:
-        return yaml.load(text, Loader=_Loader)
-    except (yaml.YAMLError, ValueError, RecursionError) as e:  # ValueError: the 99th of a month
-        mark = getattr(e, "problem_mark", None)
-        where = f"{name}:{mark.line + 1}" if mark else name
-        raise InvalidStudy(f"{where}: {_problem_of(e) or e}; write plain text and numbers") from e
+def given_study(data: Any, name: str = "study") -> Study:
+    """Return the study of a plain object that someone gives at a start, checked like a file.
+
+    Raises :class:`InvalidStudy` with one field error per mistake.
+    """
+    return checked(study_of(data, name), name, {})
 
 
-def _problem_of(error: Exception) -> str:
-    return getattr(error, "problem", None) or getattr(error, "reason", None) or ""
+def checked(study: Study, name: str, lines: Lines) -> Study:
+    """Return ``study``; raise :class:`InvalidStudy` if it has an area that no gaze can hit.
+
+    Only what is new is checked so: recordings and running sessions of earlier versions have such areas.
+    """
+    if errors := area_mistakes(study.aois):
+        raise refusal(name, [Mistake(_line_of(e, lines), e.field, e.value, e.rule) for e in errors])
+    return study
+
+
+def _line_of(error: FieldError, lines: Lines) -> int | None:
+    path: Path = tuple(int(part) if part.isdigit() else part for part in error.field.split("."))
+    return next((lines[path[:n]] for n in range(len(path), 0, -1) if path[:n] in lines), None)
 
 
 def study_of(data: Any, name: str = "study", lines: Lines | None = None) -> Study:
     """The study of a plain object, checked as a whole and under each of its conditions."""
     study = _validated(data, name, lines or {}, ())
-    for condition in study.conditions:
-        _in_force(study, condition, name, lines or {})
+    found = [m for condition in study.conditions for m in _mistakes_under(study, condition, lines or {})]
+    if found:
+        raise refusal(name, found)
     return study
+
+
+def _mistakes_under(study: Study, condition: str, lines: Lines) -> list[Mistake]:
+    found = _read(_merged(study, study.conditions[condition]), lines, ("conditions", condition))
+    return [] if isinstance(found, Study) else found
 
 
 def study_in_force(study: Study, condition: str | None) -> Study:
@@ -94,8 +78,9 @@ def study_in_force(study: Study, condition: str | None) -> Study:
         return study
     if condition not in study.conditions:
         known = ", ".join(study.conditions) or "none"
+        meant = did_you_mean(condition, study.conditions)
         raise InvalidStudy(
-            f"study {study.study} has no condition {condition!r}; it has {known}",
+            f"study {study.study} has no condition {condition!r}; it has {known}{meant}",
             (FieldError(field="condition", value=shorten(condition), rule=f"one of: {known}"),),
         )
     return _in_force(study, condition, study.study, {})
@@ -159,103 +144,17 @@ def _taken_out(patch: Any) -> list[str]:
 
 
 def _validated(data: Any, name: str, lines: Lines, under: Path) -> Study:
+    found = _read(data, lines, under)
+    if isinstance(found, Study):
+        return found
+    raise refusal(name, found)
+
+
+def _read(data: Any, lines: Lines, under: Path) -> Study | list[Mistake]:
+    """The study of a plain object, or what is wrong with it."""
     try:
-        return Study.model_validate_json(json.dumps(data, default=str))
+        return Study.model_validate_json(json.dumps(data))
     except ValidationError as e:
-        mistakes = [_mistake(found, lines, under) for found in e.errors(include_url=False)[:20]]
-        said = "; ".join(
-            f"{name}:{line}: {f.field}: {f.rule}" if line else f"{name}: {f.field}: {f.rule}" for line, f in mistakes
-        )
-        raise InvalidStudy(said, tuple(f for _, f in mistakes)) from e
-    except (RecursionError, ValueError) as e:
-        raise InvalidStudy(f"{name}: it is nested too deep or holds what JSON cannot say") from e
-
-
-def _mistake(found: Any, lines: Lines, under: Path) -> tuple[int | None, FieldError]:
-    path: Path = tuple(p for p in found["loc"] if p != "[key]") or _named_first(found["msg"], lines)
-    line = next(
-        (
-            lines[p]
-            for start in (under, ())
-            for n in range(len(path), -1, -1)
-            if (p := (*start, *path[:n])) in lines and p
-        ),
-        lines.get((), None),
-    )
-    value = "" if found["type"] == "missing" else shorten(found["input"])
-    rule = _rule(found, path, value)
-    rule = rule if len(rule) <= RULE_LENGTH else rule[: RULE_LENGTH - 1] + "…"
-    return line, FieldError(field=shorten(_dotted(path)) or "study", value=value, rule=rule)
-
-
-def _named_first(message: str, lines: Lines) -> Path:
-    """A mistake in how parts fit together is the whole study's; its message begins with the part to change."""
-    path = tuple(message.removeprefix("Value error, ").split(" ", 1)[0].split("."))
-    return path if path in lines else ()
-
-
-def _rule(found: Any, path: Path, value: str) -> str:
-    message = str(found["msg"]).removeprefix("Value error, ")
-    if found["type"] == "extra_forbidden":
-        known = sorted(_fields_at(path[:-1]))
-        near = difflib.get_close_matches(str(path[-1]), known, n=1)
-        meant = f"write {near[0]!r}" if near else f"write one of {', '.join(known)}"
-        return f"{shorten(str(path[-1]))!r} is no key here; {meant}"
-    if found["type"] == "missing":
-        return "it is missing; write it"
-    if found["type"] == "value_error":
-        return message if isinstance(found["input"], dict) else f"{value} does not do: {message}"
-    default = _default_at(path)
-    instead = "" if default is None else f"; write for example the default, {json.dumps(default)}"
-    return f"{value!r} does not do: {message[0].lower()}{message[1:]}{instead}"
-
-
-def _fields_at(path: Path) -> Iterator[str]:
-    here: Any = Study
-    for part in path:
-        here = _inside(here, part)
-    if isinstance(here, type) and issubclass(here, BaseModel):
-        yield from here.model_fields
-
-
-def _inside(annotation: Any, part: str | int) -> Any:
-    """The annotation of what stands at ``part`` of a model, list or mapping."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        field = annotation.model_fields.get(str(part))
-        return field.annotation if field else None
-    if get_origin(annotation) in (dict, list):
-        return get_args(annotation)[-1]
-    return next((found for a in get_args(annotation) if (found := _inside(a, part))), None)
-
-
-_DEFAULTS: dict[str, Any] = {}
-
-
-def _default_at(path: Path) -> Any:
-    here: Any = _DEFAULTS or _DEFAULTS.update(study_data(Study(study="default"))) or _DEFAULTS
-    for part in path:
-        try:
-            here = here[part]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return None if isinstance(here, dict) else here
-
-
-def _walk(node: yaml.Node, path: Path, depth: int) -> Iterator[tuple[Path, int, bool]]:
-    if depth > 32:
-        return
-    yield path, node.start_mark.line + 1, False
-    if isinstance(node, yaml.MappingNode):
-        seen = set()
-        for key, value in node.value:
-            name = str(key.value)  # a key can be a list
-            yield (*path, name), key.start_mark.line + 1, name in seen
-            seen.add(name)
-            yield from ((p, n, t) for p, n, t in _walk(value, (*path, name), depth + 1) if p != (*path, name))
-    elif isinstance(node, yaml.SequenceNode):
-        for i, value in enumerate(node.value):
-            yield from _walk(value, (*path, i), depth + 1)
-
-
-def _dotted(path: Path) -> str:
-    return ".".join(map(str, path))
+        return [m for found in e.errors(include_url=False)[:MISTAKES] for m in mistakes_of(found, lines, under)]
+    except (RecursionError, ValueError, TypeError):
+        return [Mistake(None, "", "", "it is nested too deep or holds what JSON cannot say")]

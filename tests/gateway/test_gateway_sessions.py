@@ -79,7 +79,7 @@ async def test_a_study_object_and_its_condition_are_in_force(mesh: Mesh) -> None
     ("change", "field", "says"),
     [({"study": "nobody"}, "study", "there are coffee, default"),
      ({"condition": "x"}, "condition", "control, adaptive"),
-     ({"study": {**STUDY, "reward": {"decay": -1}}}, "reward.decay", "greater than or equal to 0"),
+     ({"study": {**STUDY, "reward": {"decay": -1}}}, "reward.decay", "it must be at least 0"),
      ({"study": {**STUDY, "rewrad": {}}}, "rewrad", "write 'reward'"), ({"study": {}}, "study", "missing"),
      ({"study": 7}, "study", "valid"), ({"study": "../x"}, "study", "pattern"), ({"seed": -1}, "seed", "greater"),
      ({"seed": 2**53}, "seed", "less than"), ({"seed": 1.5}, "seed", "integer"), ({"seed": True}, "seed", "integer"),

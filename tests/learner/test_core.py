@@ -223,7 +223,7 @@ def test_a_decision_before_the_configuration_is_read_again_later() -> None:
 
 
 def test_an_unknown_learner_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(InvalidStudy, match="there is no learner 'deep' yet; write one of "):
+    with pytest.raises(InvalidStudy, match="there is no learner 'deep'; write one of "):
         learner_named("deep")
 
 

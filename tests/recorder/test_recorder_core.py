@@ -68,6 +68,13 @@ def test_the_study_in_force_is_that_of_the_condition_and_the_original_is_kept() 
     assert study_from_json(begun().config.study).learner.name == "q-learning"
 
 
+def test_a_recorded_start_with_an_area_that_is_refused_today_is_derived_again() -> None:
+    flat = {"name": "cup", "polygon": [[0.2, 0.2], [0.5, 0.5], [0.8, 0.8]]}
+    state = begun(study={"study": "old", "aois": [flat]}, condition=None)
+    assert study_from_json(state.config.study).aoi_names == ("cup",)
+    assert configure(state, {"reward": {"decay": 0.2}}).state.config.version == 2
+
+
 def test_a_seed_that_is_left_out_is_made_from_the_session_s_id() -> None:
     assert begun().fact.seed == int.from_bytes(hashlib.sha256(b"s1").digest()[:6], "big")
     assert begun(session="s2").fact.seed != begun().fact.seed

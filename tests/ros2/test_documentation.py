@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import yaml
 from mesh import running_mesh
 from peers import ROOT
 from ros_rig import Bridge, Peer, peer
+from ruamel.yaml import YAML
 
 pytestmark = pytest.mark.timeout(280)
 PAGE = (ROOT / "docs" / "ros2.md").read_text()
@@ -35,7 +35,7 @@ class Robot:
     def do(self, words: list[str]) -> None:
         match words:
             case ["ros2", "topic", "pub", "--once", topic, "std_msgs/msg/String", data]:
-                text = yaml.safe_load(data.replace("DECISION_ID", self.decision_id))["data"]
+                text = YAML(typ="safe", pure=True).load(data.replace("DECISION_ID", self.decision_id))["data"]
                 self.node.publish(topic, text)
                 time.sleep(0.3)
             case ["ros2", "service", "call", name, "std_srvs/srv/Trigger", "{}"]:

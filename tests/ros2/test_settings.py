@@ -69,6 +69,22 @@ def test_line_before_file_before_environment(tmp_path: Path, monkeypatch: pytest
     assert bridge_settings(line).domain == 3
 
 
+@pytest.mark.parametrize("session", ["010", "no", "1e3", "2024-01-01", "off", "true"])
+def test_a_name_in_a_parameter_file_stays_as_written(tmp_path: Path, session: str) -> None:
+    file = tmp_path / "shift.yaml"
+    for text in (session, f"'{session}'"):
+        file.write_text(f"/**:\n  ros__parameters: {{session: {text}, task: null}}\n")
+        assert bridge_settings(["--ros-args", "--params-file", str(file)]).bound_session == session
+
+
+def test_a_parameter_file_that_is_not_yaml_or_holds_itself_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "shift.yaml"
+    for text in ("/**: [", "/**: &a {ros__parameters: {session: *a}}"):
+        file.write_text(text)
+        with pytest.raises(InvalidSettings):
+            bridge_settings(["--ros-args", "--params-file", str(file)])
+
+
 def test_the_sample_parameter_file_is_valid() -> None:
     settings = bridge_settings(["--ros-args", "--params-file", str(ROOT / "deploy" / "ros2" / "shift.yaml")])
     assert settings.create_session

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
-import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from ruamel.yaml import YAML
 from shift_schemas.errors import InvalidStudy
 from shift_schemas.study import CHANGEABLE, Study, fixed_changes, merge_patch
 from shift_schemas.study_text import (
@@ -60,7 +61,7 @@ learner: {name: q-learning, learning_rate: 0.25, discount: 0.0, epsilon: 0.75, s
 """The block of the contract as it stands there, its ``gaze: {...}`` written out from the paper's Table I."""
 
 EXAMPLES = {"title", "tasks", "aois", "conditions"}
-SHOWN: dict[str, Any] = yaml.safe_load(CONTRACT)
+SHOWN: dict[str, Any] = YAML(typ="safe", pure=True).load(CONTRACT)
 
 
 def leaves(value: Any, path: str = "") -> dict[str, Any]:
@@ -102,7 +103,7 @@ def test_left_out_the_tasks_are_any_and_the_aois_thirds() -> None:
 # --- ranges ---
 
 OUT_OF_RANGE = [
-    ("study", "../x"), ("study", "a b"), ("study", 7), ("title", "x" * 501), ("tasks", []), ("tasks", ["a", "a"]),
+    ("study", "../x"), ("study", "a b"), ("title", "x" * 501), ("tasks", []), ("tasks", ["a", "a"]),
     ("tasks", ["a/b"]), ("tasks", "grasp"), ("interactions", 0), ("interactions", 1.5), ("interactions", True),
     *((f"capacity.{n}", v) for n in ("start", "min", "max", "recovery", "demanding_cost", "other_cost", "threshold")
       for v in (-0.1, "0.5", True)),
@@ -132,9 +133,7 @@ def written(path: str, value: object) -> tuple[str, int]:
     names = path.split(".")
     head = [] if path == "study" else ["study: x"]
     lines = [*head, *(f"{'  ' * i}{n}:" for i, n in enumerate(names[:-1]))]
-    lines.append(
-        f"{'  ' * (len(names) - 1)}{names[-1]}: {yaml.safe_dump(value, default_flow_style=True).split('...')[0]}"
-    )
+    lines.append(f"{'  ' * (len(names) - 1)}{names[-1]}: {json.dumps(value)}")
     return "\n".join(lines), len(lines)
 
 
@@ -157,7 +156,7 @@ def test_the_sentence_says_what_to_write_instead() -> None:
     with pytest.raises(InvalidStudy) as refused:
         parse_study("study: x\nlearner:\n  learning_rate: 1.5\n", "mine.yaml")
     assert refused.value.detail == (
-        "mine.yaml:3: learner.learning_rate: '1.5' does not do: input should be less than or equal to 1; "
+        "mine.yaml:3: learner.learning_rate: '1.5' is not valid: it must be at most 1; it is a share of one; "
         "write for example the default, 0.25"
     )
 
@@ -171,12 +170,12 @@ def test_parts_that_do_not_fit_together_are_named_with_their_values() -> None:
         ("aois: [{name: a, rectangle: [0.5, 0, 0.1, 1]}]", 2, "it is [0.5, 0.0, 0.1, 1.0]"),
         ("aois: [{name: a}]", 2, "either rectangle"),
         ("aois:\n- &a {name: a, rectangle: [0, 0, 1, 1]}\n- *a", 2, "AOI names must differ"),
-        ("aois: [{name: a, polygon: [[0, 0], [1, 1]]}]", 2, "at least 3 items"),
-        ("aois: [{name: a, rectangle: [0, 0, 1, 1.5]}]", 2, "less than or equal to 1"),
+        ("aois: [{name: a, polygon: [[0, 0], [1, 1]]}]", 2, "it has 2 entries and needs at least 3"),
+        ("aois: [{name: a, rectangle: [0, 0, 1, 1.5]}]", 2, "it is a share of the stimulus' height"),
         ("conditions:\n  a: {tasks: [x]}", 3, "overrides tasks; it can override attention"),
-        ("conditions:\n  a:\n    reward: {decay: -1}", 4, "'-1' does not do"),
-        ("conditions: {'a/b': {}}", 2, "match pattern"),
-        ("scoring: {strategies: {p: {levels: [a, b], thresholds: [0.5]}}}", 2, "for each of negation, hesitation, p;"),
+        ("conditions:\n  a:\n    reward: {decay: -1}", 4, "conditions.a.reward.decay: '-1' is not valid"),
+        ("conditions: {'a/b': {}}", 2, "'a/b' is not an id: 1 to 63 letters"),
+        ("scoring: {strategies: {p: {levels: [a, b], thresholds: [0.5]}}}", 2, "capacity.low.p: it is missing; write"),
     ):  # fmt: skip
         with pytest.raises(InvalidStudy) as refused:
             parse_study(f"study: x\n{text}", "mine.yaml")

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.study_text import LARGEST, parse_study, study_of
+from shift_schemas.study_text import parse_study, study_of
+from shift_schemas.study_yaml import LARGEST
 from strategies import json_values
 
 
@@ -19,34 +20,34 @@ def refusal(text: str) -> str:
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("study: x\nlearner: {learning_rat: 0}", "mine.yaml:2: learner.learning_rat: 'learning_rat' is no key"),
+    [("study: x\nlearner: {learning_rat: 0}", "mine.yaml:2: learner.learning_rat: 'learning_rat' is not a key"),
      ("study: x\nlearner: {learning_rat: 0}", "write 'learning_rate'"),
-     ("study: x\ncapcity: {}", "mine.yaml:2: capcity: 'capcity' is no key here; write 'capacity'"),
+     ("study: x\ncapcity: {}", "mine.yaml:2: capcity: 'capcity' is not a key here; write 'capacity'"),
      ("study: x\nzzz: 1", "write one of aois, attention,"),
-     ("study: x\nscoring:\n  strategies:\n    negation:\n      wieght: 2", "'wieght' is no key here; write 'weight'"),
+     ("study: x\nscoring:\n  strategies:\n    negation:\n      wieght: 2", "'wieght' is not a key here; write 'wei"),
      ("study: x\nscoring:\n  strategies:\n    negation:\n      wieght: 2", "mine.yaml:5: scoring.strategies.neg"),
-     ("study: x\naois:\n- nme: a", "mine.yaml:3: aois.0.nme: 'nme' is no key here; write 'name'"),
-     ("study: x\ntitle: a\ntitle: b", "mine.yaml:3: title is given twice; keep one of the two"),
-     ("study: x\nlearner:\n  epsilon: 1\n  epsilon: 0", "mine.yaml:4: learner.epsilon is given twice"),
-     ('{"study": "x",\n "study": "y"}', "mine.yaml:2: study is given twice"),
+     ("study: x\naois:\n- nme: a", "mine.yaml:3: aois.0.nme: 'nme' is not a key here; write 'name'"),
+     ("study: x\ntitle: a\ntitle: b", "mine.yaml:3: title: it is given twice, first in line 2"),
+     ("study: x\nlearner:\n  epsilon: 1\n  epsilon: 0", "mine.yaml:4: learner.epsilon: it is given twice, first"),
+     ('{"study": "x",\n "study": "y"}', "mine.yaml:2: study: it is given twice, first in line 1"),
      ("title: no name", "mine.yaml:1: study: it is missing; write it"),
-     ("", "mine.yaml:1: a study is a mapping; begin with 'study: my-study'"),
+     ("", "mine.yaml:1: a study is a mapping and the file is empty; begin with 'study: my-study'"),
      ("[1, 2]", "mine.yaml:1: a study is a mapping"), ("coffee", "mine.yaml:1: a study is a mapping"),
      ("study: [x", "mine.yaml:1: this is not YAML: "), ("study: x\n  title: y", "mine.yaml:2: this is not YAML: "),
-     ("study: x\n\ttitle: y", "mine.yaml:2: this is not YAML: "), ("study: x\n---\nstudy: y", "this is not YAML"),
-     ("study: \0", "this is not YAML: special characters are not allowed"), ("study: *nobody", "this is not YAML"),
-     ("study: x\ntasks: [yes, no]", "mine.yaml:2: tasks.0: 'True' does not do: input should be a valid string"),
-     ("study: 2024-02-30", "day is out of range for month"),
-     ("study: !!python/object:os.system x", "constructor for the tag"),
-     ("study: x\ntitle: !!int abc", "invalid literal"), ("? [a, b]\n: 1\nstudy: x", "unhashable key"),
-     ("study: x\nreward: {decay: .nan}", "mine.yaml:2: reward.decay: 'nan' does not do: input should be a finite n"),
+     ("study: x\n\ttitle: y", "mine.yaml:2: this is not YAML: "),
+     ("study: x\n---\nstudy: y", "mine.yaml:2: --- begins a second study"),
+     ("study: \0", "mine.yaml:1: this is not YAML: it has a character that no text has"),
+     ("study: *nobody", "this is not YAML"),
+     ("study: !!python/object:os.system x", "mine.yaml:1: study: the tag tag:yaml.org,2002:python/obj"),
+     ("? [a, b]\n: 1\nstudy: x", "mine.yaml:1: a key is a word; write name: value"),
+     ("study: x\nreward: {decay: .nan}", "mine.yaml:2: reward.decay: 'nan' is not valid: input should be a finite n"),
      ("study: x\nreward: {decay: -.inf}", "finite number"), ("study: x\nreward: {decay: 1.0e+999}", "finite number"),
      ("study: x\ninteractions: " + "9" * 3000, "interactions: '99999"),
-     ("study: x\nreward: 5", "mine.yaml:2: reward: '5' does not do"),
+     ("study: x\nreward: 5", "mine.yaml:2: reward: '5' is not valid: it has entries of its own; write {decay: ...}"),
      ("study: x\nscoring: {strategies: 5}", "mine.yaml:2: scoring.strategies: '5'"),
      ("study: x\nscoring: 5", "mine.yaml:2: scoring"),
-     ("study: x\n" + "z" * 900 + ": 1", "is no key here"), ("{" * 5000, "this is not YAML"),
-     ("study: x\ntitle: &a [*a]", "nested too deep or holds what JSON cannot say")],
+     ("study: x\n" + "z" * 900 + ": 1", "is not a key here"), ("{" * 5000, "this is not YAML"),
+     ("study: x\ntitle: &a [*a]", "nested too deep, or an anchor contains itself")],
     ids=lambda t: ascii(t)[:40],
 )  # fmt: skip
 def test_a_mistake_is_said_with_file_and_line(text: str, says: str) -> None:
@@ -63,6 +64,11 @@ def test_every_mistake_is_said_at_once() -> None:
 def test_a_few_lines_cannot_spell_billions() -> None:
     laughs = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 12))
     assert f"more than {LARGEST} entries" in refusal(laughs + "study: x")
+
+
+def test_a_few_lines_cannot_merge_billions() -> None:
+    merges = "a0: &a0 {}\n" + "".join(f"a{i}: &a{i} {{<<: [{', '.join([f'*a{i - 1}'] * 9)}]}}\n" for i in range(1, 12))
+    assert f"more than {LARGEST} entries" in refusal(merges + "study: x")
 
 
 def test_an_alias_is_what_it_stands_for() -> None:

@@ -21,6 +21,7 @@ from shift_cli import (
     replay_command,
     ros2_command,
     simulate_command,
+    study_command,
     verify_command,
 )
 
@@ -72,6 +73,7 @@ app.command("info")(info_command.info)
 app.command("replay")(replay_command.replay)
 app.command("ros2", context_settings=ros2_command.CONTEXT)(ros2_command.ros2)
 app.add_typer(gaze_command.app, name="gaze")
+app.add_typer(study_command.app, name="study")
 app.add_typer(evaluate_commands.app, name="evaluate")
 
 

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from pydantic import TypeAdapter
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.hints import did_you_mean
 from shift_schemas.messages import (
     Command,
     Config,
@@ -194,8 +195,7 @@ def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: S
     _check_live(state)
     missing = lacks(state, need)
     study = _study(state, missing, late)
-    if study.tasks is not None and task not in study.tasks:
-        raise UnknownThing(f"study {study.study} has no task {task!r}; it has {', '.join(study.tasks)}")
+    check_task(study, task)
     if missing.owners and not late:
         raise NotYet(missing.owners, study.decider.wait_s)
     if state.observation is None or state.config is None:
@@ -256,8 +256,7 @@ def _choose(state: DeciderState, study: Study, task: str, triple: Triple, found:
 def _override(state: DeciderState, command: SetOverride, now: Stamp, late: bool) -> Step[DeciderState]:
     _check_live(state)
     study = _study(state, lacks(state, command.need), late)
-    if study.tasks is not None and command.task not in study.tasks:
-        raise UnknownThing(f"study {study.study} has no task {command.task!r}; it has {', '.join(study.tasks)}")
+    check_task(study, command.task)
     check_strategy(study, command.strategy)
     fact = Override(
         session=state.session, stamp=now, seen=_seen(state), override_id=command.command_id, task=command.task,
@@ -266,19 +265,32 @@ def _override(state: DeciderState, command: SetOverride, now: Stamp, late: bool)
     return Step(replace(state, overrides={**state.overrides, command.task: fact}), (fact,), fact)
 
 
+def check_task(study: Study, task: str) -> None:
+    """Raise :class:`UnknownThing` that names the study's tasks, unless ``task`` is one of them or any id is."""
+    if study.tasks is not None and task not in study.tasks:
+        known = ", ".join(study.tasks)
+        meant = did_you_mean(task, study.tasks)
+        raise UnknownThing(f"study {study.study} has no task {task!r}; it has {known}{meant}")
+
+
 def check_strategy(study: Study, strategy: Strategy) -> None:
     """Raise :class:`MalformedMessage` unless each strategy of the study is given one of its levels."""
     errors = [
         FieldError(
             field=f"strategy.{name}",
             value=shorten(strategy.get(name, "")),
-            rule=f"one of {', '.join(settings.levels)}",
+            rule=f"one of {', '.join(settings.levels)}{did_you_mean(strategy.get(name, ''), settings.levels)}",
         )
         for name, settings in study.scoring.strategies.items()
         if strategy.get(name) not in settings.levels
     ]
     errors += [
-        FieldError(field=f"strategy.{shorten(name)}", value=shorten(strategy[name]), rule="no strategy of this study")
+        FieldError(
+            field=f"strategy.{shorten(name)}",
+            value=shorten(strategy[name]),
+            rule="no strategy of this study; "
+            f"it has {', '.join(study.scoring.strategies)}{did_you_mean(name, study.scoring.strategies)}",
+        )
         for name in strategy
         if name not in study.scoring.strategies
     ]

@@ -38,6 +38,7 @@ from shift_gateway.problems import (
 from shift_gateway.recordings import list_recordings, recording_path
 from shift_gateway.replica import Replica
 from shift_gateway.settings import GatewaySettings
+from shift_gateway.studies import add_studies
 
 SERVICES = tuple(OWNERS)
 EVENTS_WAITING = 2_000
@@ -111,6 +112,7 @@ def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastA
     _add_interaction(app, gateway)
     _add_reads(app, gateway)
     _add_recordings(app, gateway)
+    add_studies(app, settings.data / "studies")
     _add_operations(app, gateway)
     return app
 

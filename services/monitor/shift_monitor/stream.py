@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from shift_schemas.errors import FieldError, MalformedMessage, shorten
+from shift_schemas.hints import did_you_mean
 from shift_schemas.messages import GazeChunk
 from shift_schemas.stamps import NS
 
@@ -135,7 +136,8 @@ def check_samples(chunk: GazeChunk, plan: Plan) -> None:
     if chunk.aoi is not None:
         unknown = next(((i, n) for i, n in enumerate(chunk.aoi) if n not in plan.targets), None)
         if unknown is not None:
-            rule = f"one of: {', '.join(plan.names)}; or null for none of them"
+            meant = did_you_mean(unknown[1], plan.names)
+            rule = f"one of: {', '.join(plan.names)}; or null for none of them{meant}"
             raise _malformed(f"aoi.{unknown[0]}", unknown[1], rule)
     for name, column in (("x", chunk.x), ("y", chunk.y)):
         for i, value in enumerate(column or ()):

@@ -25,6 +25,7 @@ from shift_runtime.bus import Incoming
 from shift_runtime.journal import Batch
 from shift_runtime.reader import ReadFact
 from shift_runtime.settings import MeshSettings
+from shift_runtime.studies import study_to_start
 from shift_runtime.worker import Asked, Core, Worker, _Turn
 from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, Unavailable
 from shift_schemas.keys import OWNERS, READS, ROOT, FactKey, StreamKey, parse_key
@@ -40,7 +41,6 @@ from shift_recorder.parsing import Attachment
 from shift_recorder.reading import Recording
 from shift_recorder.segments import SegmentWriter, segments_of
 from shift_recorder.storage import StorageFailed
-from shift_recorder.studies import study_named
 
 log = structlog.get_logger()
 
@@ -130,7 +130,7 @@ class RecorderWorker(Worker[RecorderState]):
         if not isinstance(message, StartSession):
             return message
         self._check_room()
-        study = message.study if isinstance(message.study, dict) else study_named(message.study, self.studies)
+        study = study_to_start(message.study, self.studies).data
         known, revision = software()
         return message.model_copy(update={"study": study, "software": known, "revision": revision})
 

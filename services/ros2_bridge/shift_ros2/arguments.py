@@ -11,12 +11,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import yaml
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from shift_schemas.errors import InvalidSettings, shorten
+from shift_schemas.yaml_core import core_value
 
 from shift_ros2.names import Remap, check_namespace, check_node
 
 Parameters = dict[str, str]
+DEEPEST = 16
+"""Levels of a parameter file: namespaces, node, ros__parameters, name."""
 _SCHEMES = ("rostopic://", "rosservice://")
 _IGNORED = {"--enable-rosout-logs", "--disable-rosout-logs", "--enable-stdout-logs", "--disable-stdout-logs",
             "--enable-external-lib-logs", "--disable-external-lib-logs"}  # fmt: skip
@@ -71,8 +76,8 @@ def parameters_of(text: str, file: str, full_name: str, known: Callable[[str], b
     A section for every node (``/**``) may have parameters of others; one for this node may not.
     """
     try:
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as e:
+        data = _as_written(_composed(text), 0)
+    except YAMLError as e:
         raise InvalidSettings(f"{file}: this is not YAML: {shorten(str(e))}") from e
     if not isinstance(data, dict):
         raise InvalidSettings(f"{file}: a parameter file maps node names to ros__parameters")
@@ -90,6 +95,24 @@ def parameters_of(text: str, file: str, full_name: str, known: Callable[[str], b
     return found
 
 
+def _composed(text: str) -> Node | None:
+    yaml = YAML(typ="safe", pure=True)
+    yaml.max_depth = 4 * DEEPEST
+    node: Node | None = yaml.compose(text)
+    return node
+
+
+def _as_written(node: Node | None, depth: int) -> Any:
+    """The node's data, each value as it is written: a session ``010`` or ``no`` is a name, which the settings read."""
+    if node is None or depth > DEEPEST:
+        return None
+    if isinstance(node, ScalarNode):
+        return node.value if node.style is not None or core_value(node.value) is not None else None
+    if isinstance(node, MappingNode):
+        return {str(key.value): _as_written(value, depth + 1) for key, value in node.value}
+    return [_as_written(item, depth + 1) for item in node.value]
+
+
 def _sections(data: dict[Any, Any], above: str) -> list[tuple[str, Any]]:
     found = []
     for key, value in data.items():
@@ -98,7 +121,7 @@ def _sections(data: dict[Any, Any], above: str) -> list[tuple[str, Any]]:
             if "ros__parameters" in value:
                 found.append((path, value["ros__parameters"]))
             else:
-                found += _sections(value, path) if path.count("/") < 16 else []
+                found += _sections(value, path)
     return found
 
 
@@ -135,11 +158,11 @@ def _remap(found: RosArguments, text: str) -> None:
 
 def _scalar(name: str, value: Any) -> str:
     """The value as text, for the settings to read; quotes as in YAML."""
-    if isinstance(value, str) and value[:1] in "'\"":
+    if isinstance(value, str) and value[:1] in ("'", '"'):
         try:
-            value = yaml.safe_load(value)
-        except yaml.YAMLError as e:
+            value = _as_written(_composed(value), 0)
+        except YAMLError as e:
             raise InvalidSettings(f"parameter {shorten(name)}: {shorten(value)!r} is not YAML") from e
     if isinstance(value, (dict, list)):
         raise InvalidSettings(f"parameter {shorten(name)}: one value, not {shorten(value)}")
-    return str(value).lower() if isinstance(value, bool) else str(value)
+    return str(value)

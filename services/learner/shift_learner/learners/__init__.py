@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from shift_schemas.errors import InvalidStudy
+from shift_schemas.hints import did_you_mean
 
 from shift_learner.learner import Learner
 from shift_learner.learners.epsilon_greedy import EpsilonGreedy
@@ -30,5 +31,6 @@ LEARNERS: dict[str, Learner] = {
 def learner_named(name: str) -> Learner:
     """The learner of that name; :class:`InvalidStudy` names those that there are."""
     if name not in LEARNERS:
-        raise InvalidStudy(f"learner.name: there is no learner {name!r} yet; write one of {', '.join(LEARNERS)}")
+        meant = did_you_mean(name, LEARNERS)
+        raise InvalidStudy(f"learner.name: there is no learner {name!r}; write one of {', '.join(LEARNERS)}{meant}")
     return LEARNERS[name]

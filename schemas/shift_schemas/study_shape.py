@@ -1,0 +1,93 @@
+"""What stands where in a study file: the type, the keys and the default that the study's models give a path. Pure.
+
+A path is the keys and list indexes from the top: ``("aois", 0, "name")``. A condition is made of parts of a study,
+so what stands under ``("conditions", NAME)`` has the shape of the study itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import lru_cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from shift_schemas.study import Study
+
+Path = tuple[str | int, ...]
+Kind = Literal["text", "number", "boolean", "mapping", "list", "any"]
+
+CONDITIONS = "conditions"
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """Return the path as field errors name it: ``aois.0.name``."""
+    return ".".join(map(str, path))
+
+
+def kind_at(path: Path) -> Kind:
+    """Return what is expected at ``path``; ``any`` where the study has no such place."""
+    annotation = annotation_at(path)
+    if annotation is None or annotation is Any:
+        return "any"
+    origin = get_origin(annotation) or annotation
+    if origin is Literal or origin is str:
+        return "text"
+    if origin is bool:
+        return "boolean"
+    if origin in (int, float):
+        return "number"
+    return "list" if origin is list else "mapping"
+
+
+def annotation_at(path: Path) -> Any:
+    """Return the type that the study's models give ``path``, without ``None`` and constraints; ``None``: no place."""
+    here: Any = Study
+    if len(path) >= 2 and path[0] == CONDITIONS:
+        here, path = (Study, path[2:]) if len(path) > 2 else (dict[str, Any], ())
+    for part in path:
+        here = _bare(_inside(here, part))
+    return here
+
+
+def keys_at(path: Path) -> tuple[str, ...]:
+    """Return the keys that can stand in the mapping at ``path``, sorted; none where any key can."""
+    here = annotation_at(path)
+    return tuple(sorted(here.model_fields)) if isinstance(here, type) and issubclass(here, BaseModel) else ()
+
+
+def default_at(path: Path) -> Any:
+    """Return the default of a single value, ``None`` where there is no such one."""
+    here: Any = _defaults()
+    for part in path:
+        try:
+            here = here[part]
+        except (KeyError, IndexError, TypeError):
+            return None
+    return None if isinstance(here, (dict, list)) else here
+
+
+@lru_cache(maxsize=1)
+def _defaults() -> dict[str, Any]:
+    data: dict[str, Any] = Study(study="default").model_dump(mode="json", exclude_none=True)
+    return {key: value for key, value in data.items() if key not in ("study", "aois")}
+
+
+def _inside(annotation: Any, part: str | int) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        field = annotation.model_fields.get(str(part))
+        return field.annotation if field else None
+    return get_args(annotation)[-1] if get_origin(annotation) in (dict, list) else None
+
+
+def _bare(annotation: Any) -> Any:
+    """The type without what is wrapped around it: ``Annotated[X, ...]`` and ``X | None`` are X."""
+    while True:
+        origin = get_origin(annotation)
+        if origin is Annotated:
+            annotation = get_args(annotation)[0]
+        elif origin in (Union, UnionType):
+            annotation = next(a for a in get_args(annotation) if a is not NoneType)
+        else:
+            return annotation
