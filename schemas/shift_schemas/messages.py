@@ -21,7 +21,8 @@ SessionState = Literal["live", "ending", "ended"]
 GazeOutcome = Literal["applied", "late"]
 Seconds = Annotated[float, Field(ge=-1e11, le=1e11)]
 Text = Annotated[str, Field(max_length=10_000)]
-Warnings = Annotated[list[str], Field(max_length=100)]
+MOST_WARNINGS = 100
+Warnings = Annotated[list[str], Field(max_length=MOST_WARNINGS)]
 FORMAT = 2
 """What a session records. 1: no shares of gaze, no warnings, no restarts. A session keeps its first format."""
 DEEPEST = 32
@@ -417,7 +418,7 @@ class StartSession(Command):
     """Begin a session."""
 
     procedure = "start_session"
-    beside = frozenset({"need", "command_id", "format"})
+    beside = frozenset({"need", "command_id", "format", "warnings"})
 
     participant: Id
     study: str | JsonObject = Field(default="default", description="A study's id, or the study itself.")
@@ -427,6 +428,7 @@ class StartSession(Command):
     software: str = ""
     revision: str = ""
     format: Count = FORMAT
+    warnings: Warnings = Field(default=[], description="What was found when the study was read.")
 
 
 class EndSession(Command):

@@ -53,6 +53,7 @@ PLAUSIBLE: dict[str, Plausible] = {
     "fixation.maximum_gap_s": Plausible("the longest loss inside a fixation in seconds", 0.01, 1, "ms", 1e-3),
     "attention.step_s": Plausible("dwell in seconds", 0.001, 10, "ms", 1e-3),
     "attention.maximum_dwell_s": Plausible("dwell in seconds", 0.02, 60, "ms", 1e-3),
+    "attention.minimum_dwell_s": Plausible("dwell in seconds", 0, 30, "ms", 1e-3),
     "reward.decay": Plausible("the decay of the reward per second", 0, 10, "", 0.0),
     "decider.wait_s": Plausible("a wait in seconds", 0, 60, "ms", 1e-3),
 }

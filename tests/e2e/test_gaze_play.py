@@ -87,3 +87,33 @@ def test_what_cannot_be_played_is_said_in_a_sentence(mesh: LiveMesh, tmp_path: P
         assert process.returncode == 2, said
         assert "Traceback" not in said
         assert said.strip()
+
+
+def table(path: Path, x: float, n: int = 300) -> Path:
+    """A Titta table of one second at 300 Hz, both eyes at ``x``, 0.5; -1 stands for lost."""
+    point = "gaze_point_on_display_area"
+    header = ["device_time_stamp"]
+    for eye in ("left", "right"):
+        header += [f"{eye}_{point}_x", f"{eye}_{point}_y", f"{eye}_gaze_point_valid"]
+    valid = "0" if x == -1.0 else "1"
+    rows = [[str(1_000_000 + i * 3333), *[str(x), "0.5", valid] * 2] for i in range(n)]
+    path.write_text("\n".join("\t".join(row) for row in [header, *rows]) + "\n")
+    return path
+
+
+def test_gaze_of_which_nothing_counts_ends_with_exit_code_1_and_says_why(mesh: LiveMesh, tmp_path: Path) -> None:
+    with RestClient(mesh.url) as shift:
+        shift.start("P00", session="counts", study=STUDY)
+    good = table(tmp_path / "good.tsv", 0.1)
+    for file, flags, code, words in (
+        (good, ("--source", "eyes"), 0, "300 samples at 300 Hz, 1.0 s of gaze, lost 0.0%"),
+        (good, ("--source", "eyes"), 1, "the session had all of it already"),
+        (table(tmp_path / "other.tsv", 0.9), ("--source", "eyes"), 0, "segment 1 of the source begins"),
+        (table(tmp_path / "lost.tsv", -1.0), (), 1, "every sample is lost"),
+        (table(tmp_path / "off.tsv", 1.5), (), 1, "off the stimulus 100.0%"),
+        (good, ("--source", "P 01"), 2, "for example P-01"),
+    ):
+        process = command(mesh, file, "counts", "--rate", "100", *flags)
+        _, said = process.communicate(timeout=60)
+        assert (process.returncode, "Traceback" in said) == (code, False), said
+        assert words in " ".join(said.split()), said

@@ -205,15 +205,20 @@ async def test_the_observation_field_by_field(mesh: Mesh) -> None:
     assert fresh["capacity"] == {"value": 1.0, "category": "high"}
     assert fresh["gaze"] == {
         "category": "uncertain", "weights": {"robot": 0.5, "cup": 0.5}, "focus_shift": 0.0, "aoi": None, "fixations": 0,
-        "dropped": 0,
+        "dropped": 0, "restarts": 0, "samples": 0, "dwell_s": 0.0, "lost": 0.0, "unclassified": 0.0, "off_aoi": 0.0,
+        "off_stimulus": 0.0, "received": None, "age_s": None,
     }  # fmt: skip
+    assert fresh["warnings"] == []
     assert fresh["awareness"] == {}
-    assert await session.look(["robot", "robot", "robot"], 0.1) == {"accepted": 3}
+    assert await session.look(["robot"] * 7, 0.1) == {"accepted": 7}
+    mesh.clock.ns += 2_500_000_000
     decision = await session.decide()
     await session.report(decision["decision_id"], understood=True, able=False)
     seen = await session.read("observation")
-    assert seen["gaze"]["weights"] == pytest.approx({"robot": 0.7, "cup": 0.3})
+    assert seen["gaze"]["weights"] == pytest.approx({"robot": 1.0, "cup": 0.0})
     assert (seen["gaze"]["category"], seen["gaze"]["aoi"]) == ("focused", "robot")
+    assert (seen["gaze"]["samples"], seen["gaze"]["dwell_s"], seen["gaze"]["lost"]) == (7, pytest.approx(0.6), 0.0)
+    assert seen["gaze"]["age_s"] == 2.5, "of the last sample, when asked"
     assert seen["awareness"] == {
         "grasp": {"category": "misconception_enabledness", "comprehension": 1.0, "enabledness": 0.0, "results": 1}
     }
@@ -245,8 +250,50 @@ async def test_chunks_are_numbered(mesh: Mesh) -> None:
     assert await send(0, 0.0) == {"accepted": 1}, "a repeat is acknowledged and ignored"
     assert await send(3, 3.0) == {"accepted": 1}
     assert (await session.read("observation"))["gaze"]["dropped"] == 2
-    assert await send(1, 1.0) == {"accepted": 0}, "late: recorded, not applied"
+    assert await send(1, 1.0) == {
+        "accepted": 0, "warnings": ["chunk 1 comes after chunk 3: it is recorded and not applied"]
+    }  # fmt: skip
     assert (await session.read())["counts"]["gaze"] == 3
+
+
+async def test_a_tracker_that_is_started_again_loses_nothing_that_was_answered(mesh: Mesh) -> None:
+    """Over REST and over the WebSocket: 200 chunks, again from number 0 with other content, and each of them twice."""
+    session = await mesh.session(STUDY)
+
+    def chunk(seq: int, start_s: float, x: float) -> dict[str, Any]:
+        t = [round(start_s + seq * 0.05 + i / 100, 6) for i in range(5)]
+        return {"source": "tx300", "seq": seq, "t": t, "x": [x] * 5, "y": [0.5] * 5}
+
+    sent = [chunk(seq, 100.0, 0.1) for seq in range(60)] + [chunk(seq, 110.0, 0.9) for seq in range(60)]
+    for body in sent[:90]:
+        first = await session.done("gaze", body)
+        assert first == await session.done("gaze", body), "the same content gets the first result"
+    async with gaze_socket(mesh, session.name) as socket:
+        for body in sent[90:]:
+            assert (await socket.send(body))["accepted"] == 5
+            assert (await socket.send(body))["accepted"] == 5
+    gaze = (await session.read("observation"))["gaze"]
+    assert (gaze["restarts"], gaze["aoi"], gaze["dropped"], gaze["samples"]) == (1, "cup", 0, 600)
+    assert (await session.read())["counts"]["gaze"] == 120
+    await session.done("gaze", sent[0])
+    assert (await session.read())["counts"]["gaze"] == 120, "a repeat is one, however long ago"
+
+
+async def test_the_same_gaze_sent_twice_at_once_is_recorded_once(mesh: Mesh) -> None:
+    session = await mesh.session(STUDY)
+    body = {"source": "a", "seq": 0, "t": [0.0, 0.1], "aoi": ["cup", "cup"]}
+    answers = await asyncio.gather(*(session.done("gaze", body) for _ in range(8)))
+    assert answers == [{"accepted": 2}] * 8
+    assert (await session.read())["counts"]["gaze"] == 1
+
+
+async def test_what_is_accepted_and_can_have_no_effect_is_said(mesh: Mesh) -> None:
+    session = await mesh.session(STUDY)
+    t = [i / 2 for i in range(10)]
+    answer = await session.done("gaze", {"source": "a", "seq": 0, "t": t, "x": [0.1] * 10, "y": [0.5] * 10})
+    assert answer["accepted"] == 10
+    assert any("can never make a fixation" in warning for warning in answer["warnings"])
+    assert (await session.read("observation"))["warnings"] == answer["warnings"]
 
 
 async def test_an_aoi_that_the_study_does_not_name_is_refused_with_those_that_it_has(mesh: Mesh) -> None:
@@ -284,7 +331,7 @@ async def test_a_websocket_takes_a_chunk_a_message(mesh: Mesh) -> None:
         for nonsense, status in (
             ("{", 422), ("", 422), (b"\xff", 422), ("[]", 422), ('{"seq":1,"seq":1}', 422),
             (chunk | {"aoi": ["moon", None]}, 422),
-            ("x" * (256 * 1024 + 1), 413), (chunk | {"seq": 2, "t": [1.0, 9.0]}, 422),
+            ("x" * (256 * 1024 + 1), 413), (chunk | {"seq": 2, "t": [1.5, 9.0]}, 422),
         ):  # fmt: skip
             problem = await socket.send(nonsense)
             assert problem["status"] == status
@@ -298,6 +345,40 @@ async def test_a_websocket_takes_a_chunk_a_message(mesh: Mesh) -> None:
 async def test_a_websocket_answers_with_problems_of_ids_and_sessions(mesh: Mesh, name: str, status: int) -> None:
     async with gaze_socket(mesh, name) as socket:
         assert (await socket.send("{"))["status"] == status
+
+
+# --- corrections ---
+
+
+async def test_a_wrong_report_is_corrected_and_both_are_kept(mesh: Mesh) -> None:
+    session = await mesh.session()
+    decision_id = (await session.decide())["decision_id"]
+    result = {"success": False, "duration_s": 5000.0}
+    wrong = {"decision_id": decision_id, "comprehension": result, "enabledness": result}
+    first = await session.done("performance", wrong)
+    assert any("divide milliseconds by 1000" in warning for warning in first["warnings"])
+    right = {name: {"success": True, "duration_s": 5.0} for name in ("comprehension", "enabledness")}
+    body = {"decision_id": decision_id, **right, "corrects": True}
+    corrected, again = await session.post("performance", body), await session.post("performance", body)
+    assert (corrected.status_code, again.status_code) == (201, 200)
+    assert corrected.json() == again.json()
+    assert corrected.json()["cumulative_reward"] == pytest.approx(exp(-0.5))
+    seen = await session.read("observation")
+    assert seen["awareness"]["grasp"] == {
+        "category": "success", "comprehension": 1.0, "enabledness": 1.0, "results": 1
+    }  # fmt: skip
+    assert (await session.read("policy"))["cumulative_reward"] == corrected.json()["cumulative_reward"]
+    assert (await session.read())["counts"]["performance"] == 2
+    assert (await session.post("performance", {**body, "decision_id": "nothing"})).status_code == 404
+
+
+async def test_a_correction_of_what_was_never_reported_is_refused(mesh: Mesh) -> None:
+    session = await mesh.session()
+    decision_id = (await session.decide())["decision_id"]
+    right = {name: {"success": True, "duration_s": 5.0} for name in ("comprehension", "enabledness")}
+    answer = await session.post("performance", {"decision_id": decision_id, **right, "corrects": True})
+    assert answer.status_code == 409
+    assert "send it without corrects" in answer.json()["detail"]
 
 
 # --- the policy ---

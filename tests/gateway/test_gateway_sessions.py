@@ -271,3 +271,26 @@ async def test_an_ended_session_takes_nothing_and_can_be_read(mesh: Mesh) -> Non
     for tail, shown in before.items():
         assert await session.read(tail) == shown
     assert (await session.read("observation"))["session"] == session.name
+
+
+async def test_a_start_without_a_condition_is_warned_about_where_the_study_has_some(mesh: Mesh) -> None:
+    study = {"study": "x", "conditions": {"control": {"learner": {"name": "scoring"}}, "adaptive": {}}}
+    body = {"participant": "P01", "study": study}
+    answer = await mesh.http.post("/v1/sessions", json=body)
+    assert answer.status_code == 201
+    assert any("conditions control, adaptive and none was chosen" in w for w in answer.json()["warnings"])
+    chosen = await mesh.http.post("/v1/sessions", json=body | {"condition": "adaptive"})
+    assert chosen.json()["warnings"] == []
+    refused = await mesh.http.post("/v1/sessions", json=body | {"study": study | {"require_condition": True}})
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["field"] == "condition"
+    assert "one of: control, adaptive" in refused.json()["detail"]
+    nonsense = await mesh.http.post("/v1/sessions", json=body | {"study": {"study": "x", "require_condition": True}})
+    assert nonsense.status_code == 422
+
+
+async def test_what_is_doubtful_in_a_study_is_said_at_its_start(mesh: Mesh) -> None:
+    study = {"study": "x", "fixation": {"distance_cm": 650}}
+    answer = await mesh.http.post("/v1/sessions", json={"participant": "P01", "study": study})
+    assert answer.status_code == 201
+    assert any("fixation.distance_cm is 650" in warning for warning in answer.json()["warnings"])

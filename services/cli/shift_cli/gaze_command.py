@@ -5,10 +5,16 @@ from __future__ import annotations
 import re
 import secrets
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
+
+if TYPE_CHECKING:
+    from shift_runtime.rest_client import RestClient
+
+    from shift_cli.gaze_files import Sample
 
 app = typer.Typer(no_args_is_help=True, help="Gaze recordings.")
 PIECE_S = 0.05
@@ -22,38 +28,116 @@ def _gaze() -> None:
 
 @app.command()
 def play(
-    file: Annotated[Path, typer.Argument(help="Tobii TX300 or Titta table (TSV), or its gzip.")],
+    file: Annotated[Path, typer.Argument(help="Tobii TX300 or Titta table (TSV), or its gzip.", envvar="SHIFT_FILE")],
     session: Annotated[str, typer.Option(help="The session to stream into.", envvar="SHIFT_SESSION")],
-    speed: Annotated[float, typer.Option(help="Times real time.", envvar="SHIFT_SPEED", min=0.01, max=1000)] = 1.0,
+    speed: Annotated[
+        float, typer.Option("--speed", "--rate", help="Times real time.", envvar="SHIFT_SPEED", min=0.01, max=1000)
+    ] = 1.0,
     url: Annotated[str, typer.Option(help="The gateway.", envvar="SHIFT_URL")] = "http://127.0.0.1:8080",
-    source: Annotated[str | None, typer.Option(help="Name of the gaze source; left out: one of its own.")] = None,
+    source: Annotated[
+        str | None, typer.Option(help="Name of the gaze source; left out: one of its own.", envvar="SHIFT_SOURCE")
+    ] = None,
 ) -> None:
     """Stream a recording of an eye tracker into a session, with its own timing.
+
+    Prints rate, duration, and which share of the samples is lost and off the stimulus. Exit code 1 where nothing of
+    the gaze counted: none of it was dwell on an AOI.
 
     \b
     shift-mesh gaze play trial1.tsv.gz --session s1
     shift-mesh gaze play trial1.tsv.gz --session s1 --speed 20
     """
-    from rich.console import Console
-    from rich.progress import Progress
     from shift_runtime.rest_client import RestClient
     from shift_schemas.errors import MalformedMessage
 
-    from shift_cli.gaze_files import chunks, samples
+    from shift_cli.gaze_files import samples
 
+    _check_source(source)
     found = list(samples(file))
     if not found:
         raise MalformedMessage(f"{file.name} holds no samples")
+    with RestClient(url) as shift:
+        before = shift.observation(session)["gaze"]
+        warnings = _stream(shift, session, found, source or _source_of(file), file.name, speed)
+        after = shift.observation(session)["gaze"]
+    said = describe(found)
+    typer.echo(f"{said.sentence}, into session {session}", err=True)
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    if why := _nothing_counted(said, before, after):
+        typer.echo(f"nothing of this gaze counted: {why}", err=True)
+        raise typer.Exit(1)
+
+
+class Described(NamedTuple):
+    """What a recording holds; shares are of its samples, 0..1."""
+
+    rate_hz: float
+    length_s: float
+    lost: float
+    off_stimulus: float
+    sentence: str
+
+
+def describe(found: Sequence[Sample]) -> Described:
+    """Return rate, length and shares of a recording's samples, and a sentence of them."""
+    length_s = found[-1].t - found[0].t
+    rate_hz = (len(found) - 1) / length_s if length_s > 0 else 0.0
+    points = [(s.x, s.y) for s in found if s.valid and s.x is not None and s.y is not None]
+    off = sum(not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0) for x, y in points)
+    lost, off_stimulus = 1 - len(points) / len(found), off / len(found)
+    sentence = (
+        f"{len(found)} samples at {rate_hz:.4g} Hz, {length_s:.1f} s of gaze, lost {lost:.1%}, "
+        f"off the stimulus {off_stimulus:.1%}"
+    )
+    return Described(rate_hz, length_s, lost, off_stimulus, sentence)
+
+
+def _stream(
+    shift: RestClient, session: str, found: list[Sample], source: str, name: str, speed: float
+) -> list[str]:  # fmt: skip
+    """Send the samples, each when its time has come; the warnings of the last answer and of restarts."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from shift_cli.gaze_files import chunks
+
     length_s = found[-1].t - found[0].t
     per_chunk = max(1, round(len(found) / max(length_s, 1e-9) * PIECE_S * speed))
-    with RestClient(url) as shift, Progress(console=Console(stderr=True)) as progress:
-        bar = progress.add_task(f"{file.name} at {speed:g}x", total=len(found))
+    answer: dict[str, Any] = {}
+    begun_anew: list[str] = []
+    with Progress(console=Console(stderr=True)) as progress:
+        bar = progress.add_task(f"{name} at {speed:g}x", total=len(found))
         begun = time.monotonic()
-        for chunk in chunks(found, per_chunk, source or _source_of(file)):
+        for chunk in chunks(found, per_chunk, source):
             time.sleep(max(0.0, begun + (chunk.t[-1] - found[0].t) / speed - time.monotonic()))
-            shift.gaze(session, chunk)
+            answer = shift.gaze(session, chunk)
+            begun_anew += [w for w in answer.get("warnings", ()) if "segment" in w]
             progress.advance(bar, len(chunk.t))
-    typer.echo(f"{len(found)} samples, {length_s:.1f} s of gaze, into session {session}", err=True)
+    return list(dict.fromkeys([*begun_anew, *answer.get("warnings", ())]))
+
+
+def _nothing_counted(said: Described, before: dict[str, Any], after: dict[str, Any]) -> str:
+    """Why no dwell on an AOI came of it; empty where some did, or where the session does not tell."""
+    if said.lost == 1.0:
+        return "every sample is lost"
+    if said.lost + said.off_stimulus == 1.0:
+        return "every sample is lost or off the stimulus; check the file's units"
+    if after.get("dwell_s") is None or after["dwell_s"] > before["dwell_s"]:
+        return ""
+    if after["samples"] == before["samples"]:
+        return "the session had all of it already, under this source; give another --source to play it once more"
+    return "no fixation of it fell on an AOI; check the study's AOIs, the rate and the share that is lost"
+
+
+def _check_source(source: str | None) -> None:
+    from shift_schemas.errors import InvalidSettings, shorten
+    from shift_schemas.hints import id_like
+    from shift_schemas.ids import ID_RULE, is_id
+
+    if source is not None and not is_id(source):
+        proposal = f"; for example {id_like(source)}" if id_like(source) else ""
+        raise InvalidSettings(f"--source: {shorten(source)!r} is not an id: {ID_RULE}{proposal}")
 
 
 def _source_of(file: Path) -> str:

@@ -350,7 +350,9 @@ def _observed_gaze(
         stream, attention, found = points_applied(stream, state.attention, times, chunk, plan)
     else:
         stream, attention, found = *names_applied(stream, state.attention, times, chunk.aoi, plan), []
-    warnings += rate_warnings(spacings, chunk.aoi is None, plan.rule.gap_ns) + share_warnings(stream.account)
+    warnings += rate_warnings(spacings, chunk.aoi is None, plan.rule.gap_ns) + share_warnings(
+        stream.account, chunk.aoi is None, plan.rule.gap_ns if chunk.aoi is None else plan.longest_ns
+    )
     told = _told(state, warnings)
     after = replace(
         state, stream=stream, attention=attention, dropped=dropped, fixations=state.fixations + len(found),

@@ -21,8 +21,8 @@ SLOWEST_HZ, FASTEST_HZ = 1.0, 20_000.0
 """Chosen: no eye tracker is slower or faster; the fastest on the market samples at 2 kHz."""
 MOST = 0.5
 """A larger share of the source's time, lost or off the stimulus, is told of."""
-EARLIEST_NS, EARLIEST_SAMPLES = NS // 2, 10
-"""Chosen: from so much time or so many samples on, shares are told of."""
+EARLIEST_NS = NS // 2
+"""Chosen: from so much time on, shares are told of; or from ten samples on, whatever their time."""
 
 
 def next_spacings(before: Sequence[int], last_ns: int | None, times: Sequence[int]) -> tuple[int, ...]:
@@ -60,13 +60,17 @@ def rate_warnings(spacings: Sequence[int], points: bool, gap_ns: int) -> list[st
     return found
 
 
-def share_warnings(account: GazeAccount) -> list[str]:
-    """Return sentences about gaze most of which is lost or off the stimulus."""
-    if account.total_ns < EARLIEST_NS and account.samples < EARLIEST_SAMPLES:
+def share_warnings(account: GazeAccount, points: bool, longest_ns: int) -> list[str]:
+    """Return sentences about gaze most of which is lost or off the stimulus; a sample stands for ``longest_ns``."""
+    if account.samples < (ENOUGH if account.total_ns >= EARLIEST_NS else 10):
         return []
     found, share = [], shares(account)
     if share.lost > MOST:
-        found.append(f"{share.lost:.0%} of the source's time is lost: no valid sample stands for it; check the tracker")
+        why = "check the tracker" if points else "a source of AOI names must speak at least so often"
+        found.append(
+            f"{share.lost:.0%} of the source's time is lost: no valid sample stands for it, and each stands for at "
+            f"most {_s(longest_ns)} s; {why}"
+        )
     if share.off_stimulus > MOST:
         found.append(
             f"{share.off_stimulus:.0%} of the source's time is off the stimulus: x or y is outside 0..1; check the "

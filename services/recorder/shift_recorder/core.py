@@ -13,7 +13,18 @@ from typing import Any, ClassVar
 
 from pydantic import TypeAdapter
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, UnknownThing
-from shift_schemas.messages import Command, Config, Configure, EndSession, Fact, Mark, Marker, Session, StartSession
+from shift_schemas.messages import (
+    MOST_WARNINGS,
+    Command,
+    Config,
+    Configure,
+    EndSession,
+    Fact,
+    Mark,
+    Marker,
+    Session,
+    StartSession,
+)
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import Step
 from shift_schemas.study import Study, fixed_changes
@@ -118,14 +129,16 @@ def _check_condition(study: Study, condition: str | None) -> None:
 
 def _start_warnings(study: Study, command: StartSession) -> list[str]:
     """What is accepted and may not be meant; a session of format 1 records none."""
-    if command.format == 1 or command.condition is not None or not study.conditions:
+    if command.format == 1:
         return []
+    if command.condition is not None or not study.conditions:
+        return command.warnings[:MOST_WARNINGS]
     known = ", ".join(study.conditions)
     warning = (
         f"study {study.study} has the conditions {known} and none was chosen, so this participant is in none of them; "
         "give one as condition, or write require_condition: true into the study"
     )
-    return [warning]
+    return [warning, *command.warnings][:MOST_WARNINGS]
 
 
 def _end(state: RecorderState, now: Stamp) -> Step[RecorderState]:

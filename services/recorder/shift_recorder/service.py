@@ -130,9 +130,10 @@ class RecorderWorker(Worker[RecorderState]):
         if not isinstance(message, StartSession):
             return message
         self._check_room()
-        study = study_to_start(message.study, self.studies).data
+        study, warnings = study_to_start(message.study, self.studies)
         known, revision = software()
-        return message.model_copy(update={"study": study, "software": known, "revision": revision})
+        found = {"study": study, "software": known, "revision": revision, "warnings": list(warnings)}
+        return message.model_copy(update=found)
 
     def _check_room(self) -> None:
         try:

@@ -61,14 +61,15 @@ class RestClient:
         return self._ask("POST", f"/v1/sessions/{session}/decisions", body)
 
     def report(
-        self, session: str, decision_id: str, understood: bool, understood_s: float, able: bool, able_s: float
-    ) -> dict[str, Any]:
-        """How the task went: comprehension and enabledness, each success and seconds."""
+        self, session: str, decision_id: str, understood: bool, understood_s: float, able: bool, able_s: float,
+        corrects: bool = False,
+    ) -> dict[str, Any]:  # fmt: skip
+        """How the task went, each dimension with success and seconds; ``corrects`` replaces an earlier report."""
         body = {
             "decision_id": decision_id,
             "comprehension": {"success": understood, "duration_s": understood_s},
             "enabledness": {"success": able, "duration_s": able_s},
-        }
+        } | ({"corrects": True} if corrects else {})
         return self._ask("POST", f"/v1/sessions/{session}/performance", body)
 
     def end(self, session: str) -> dict[str, Any]:
