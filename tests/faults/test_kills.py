@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 from interactions import check_recording, essences, expected, interact
 from mesh import LiveMesh, running_mesh
+from shift_recorder.verify import verify
 from shift_runtime.rest_client import RestClient
 
 WORKERS = ("shift_monitor", "shift_decider", "shift_learner")
@@ -83,9 +84,9 @@ def test_row_4_any_of_them_at_any_moment(mesh: LiveMesh, seed: int) -> None:
     under_fire(mesh, f"row-4-{seed}", ALL, seed, 40, 5)
 
 
-def test_the_recorder_dies_at_any_moment_of_an_end(mesh: LiveMesh) -> None:
+def test_the_recorder_dies_at_twelve_moments_of_an_end_and_every_recording_verifies(mesh: LiveMesh) -> None:
     """The end goes on where it was, once, though it is asked for again meanwhile."""
-    for delay_ms in (0, 10, 20, 40, 60, 90):
+    for delay_ms in (0, 5, 10, 15, 20, 30, 40, 50, 60, 75, 90, 120):
         session = f"end-{delay_ms}"
         killer = threading.Timer(delay_ms / 1000, mesh.kill, ("shift_recorder",))
 
@@ -97,6 +98,8 @@ def test_the_recorder_dies_at_any_moment_of_an_end(mesh: LiveMesh) -> None:
         killer.join()
         assert essences(done) == expected(21, 5)
         check_recording(mesh, done)
+        report = verify(mesh.data / "recordings" / f"{session}.mcap")
+        assert (report.ok, report.complete, report.checksum) == (True, True, "matches"), report.difference
         with RestClient(mesh.url, patience_s=60.0) as shift:
             assert shift.end(session) == done.ended
     mesh.wait_ready()

@@ -107,7 +107,7 @@ def test_row_11_a_disk_that_fills_up_refuses_and_goes_on_exactly_once_there_is_r
         shift.start("P00", session="full", study=STUDY, seed=7)
         done: list[LiveEpisode] = list(drive(shift, "full", paper_user("A"), 10))
         ballast = data / "ballast"
-        _fill(ballast)
+        fill(ballast)
         refused = _refusal(mesh)
         assert refused.status_code == 503
         assert "cannot write its journal" in refused.json()["detail"]
@@ -128,7 +128,7 @@ def test_row_11_a_disk_that_fills_up_refuses_and_goes_on_exactly_once_there_is_r
         assert mesh.stop() == 0
 
 
-def _fill(ballast: Path) -> None:
+def fill(ballast: Path) -> None:
     """Take all the room that there is, to the last page."""
     with open(ballast, "wb", buffering=0) as file:
         for size in (2**20, 2**12):
@@ -146,7 +146,7 @@ def _refusal(mesh: LiveMesh) -> httpx.Response:
         answer = httpx.post(f"{mesh.url}/v1/sessions/full/markers", json=body, timeout=30.0)
         if answer.status_code != 201:
             return answer
-        _fill(mesh.data / "ballast-2")
+        fill(mesh.data / "ballast-2")
     raise AssertionError("the disk was never full")
 
 

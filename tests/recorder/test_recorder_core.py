@@ -146,7 +146,7 @@ def test_an_end_comes_in_two_halves() -> None:
     (first,) = ending.facts
     assert isinstance(first, Session)
     assert (first.state, first.ended) == ("ending", None)
-    done = core.step(ending.state, finish(), LATER)
+    done = core.step(ending.state, finish(), NOW)
     (last,) = done.facts
     assert isinstance(last, Session)
     assert (last.state, last.ended, last.recording, last.sha256) == ("ended", LATER, "s1.mcap", "ab" * 32)
@@ -165,8 +165,15 @@ def test_the_second_half_is_a_repeat_of_the_first() -> None:
     assert finish().procedure == "end_session"
 
 
+def test_every_attempt_to_finish_says_the_same_time_of_the_end() -> None:
+    ending = core.step(begun(), END, NOW).state
+    within, outside = core.ended(ending), core.step(ending, finish(), LATER).facts[0]
+    assert isinstance(outside, Session)
+    assert within.ended == outside.ended == within.stamp == outside.stamp == NOW
+
+
 def test_the_session_within_its_own_recording_has_no_checksum() -> None:
-    within = core.ended(core.step(begun(), END, NOW).state, LATER)
+    within = core.ended(core.step(begun(), END, NOW).state)
     assert (within.state, within.recording, within.sha256) == ("ended", "s1.mcap", "")
 
 

@@ -188,7 +188,7 @@ class Session:
         self.deliver()
         self.now_ns += 1_000_000
         state: recorder.RecorderState = self.states["recorder"]
-        self.states["recorder"] = replace(state, fact=recorder.ended(state, Stamp.of(self.now_ns)))
+        self.states["recorder"] = replace(state, fact=recorder.ended(state))
         self._put("recorder", self.states["recorder"].fact)
         self.record()
         return self

@@ -93,7 +93,7 @@ def step(state: RecorderState | None, message: Fact | Command, now: Stamp, late:
         raise UnknownThing(f"there is no session {message.session}")
     match message:
         case FinishSession():
-            return _finish(state, message, now)
+            return _finish(state, message)
         case EndSession():
             return _end(state, now)
         case Configure():
@@ -148,15 +148,18 @@ def _end(state: RecorderState, now: Stamp) -> Step[RecorderState]:
     return Step(replace(state, fact=fact), (fact,))
 
 
-def ended(state: RecorderState, now: Stamp) -> Session:
-    """The session as it ended, as its own recording has it (which cannot hold its own checksum)."""
+def ended(state: RecorderState) -> Session:
+    """Return the session as it ended, as its own recording has it (which cannot hold its own checksum).
+
+    The end has the time at which it was accepted, which is committed: each attempt to finish says the same.
+    """
     name = f"{state.fact.session}.mcap"
-    return state.fact.model_copy(update={"stamp": now, "state": "ended", "ended": now, "recording": name})
+    return state.fact.model_copy(update={"state": "ended", "ended": state.fact.stamp, "recording": name})
 
 
-def _finish(state: RecorderState, command: FinishSession, now: Stamp) -> Step[RecorderState]:
+def _finish(state: RecorderState, command: FinishSession) -> Step[RecorderState]:
     update = {"sha256": command.sha256, "counts": command.counts, "recording": command.recording}
-    fact = ended(state, now).model_copy(update=update)
+    fact = ended(state).model_copy(update=update)
     result = {
         "session": fact.session, "state": "ended", "recording": fact.recording,
         "sha256": fact.sha256, "counts": fact.counts,

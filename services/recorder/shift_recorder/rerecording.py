@@ -117,9 +117,10 @@ class Rerecord:
         fact, now = placed.fact, placed.fact.stamp
         match fact:
             case Session(state="ended"):
-                derived: Fact = ended(state, now)
-                self.state = RecorderState(ended(state, now), state.config, state.original)
-                return derived
+                if state.fact.format == 1:  # each attempt to finish had a time of its own then
+                    state = replace(state, fact=state.fact.model_copy(update={"stamp": now}))
+                self.state = replace(state, fact=ended(state))
+                return self.state.fact
             case Session():
                 after = step(state, EndSession(command_id=END_ID, session=fact.session), now)
             case Config():

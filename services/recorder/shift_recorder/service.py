@@ -220,6 +220,7 @@ class RecorderWorker(Worker[RecorderState]):
         if not self._alarm:
             log.error("the recording cannot be written", session=session, error=error.detail)
         self._alarm = error.detail
+        self._check_later()  # there may be nothing left to write that would notice when there is room again
         self.metrics.commit_failed()
         writer = self._writers.pop(session, None)
         if writer is not None:
@@ -283,7 +284,7 @@ class RecorderWorker(Worker[RecorderState]):
         await self._converge(session)
         state = self._state(session)
         assert state is not None
-        state = replace(state, fact=core.ended(state, self.clock.now()))
+        state = replace(state, fact=core.ended(state))
         self._write(session, state, state.fact, self.journal.heads[session] + 1)
         self._flush()
         if behind := self._behind(session):
@@ -363,12 +364,17 @@ def _has_not_read(peer: str, pages: dict[str, OutboxPage], session: str) -> bool
 
 
 def _first_and_last_policy(sources: Iterable[Path]) -> tuple[bytes, bytes] | None:
-    found: tuple[bytes, bytes] | None = None
+    """By the learner's numbers: what a cut segment lost stands in a later one."""
+    first: tuple[int, bytes] | None = None
+    last: tuple[int, bytes] | None = None
     for source in sources:
         with suppress(DamagedRecording):
             for message in Recording(source).messages({"policy"}):
-                found = (found[0] if found else message.data, message.data)
-    return found
+                if first is None or message.sequence < first[0]:
+                    first = (message.sequence, message.data)
+                if last is None or message.sequence > last[0]:
+                    last = (message.sequence, message.data)
+    return (first[1], last[1]) if first is not None and last is not None else None
 
 
 def _states_of(policies: tuple[bytes, bytes] | None) -> tuple[str, ...]:
