@@ -548,3 +548,7 @@ class Health(Message):
     ready: bool = Field(description="It has read every journal that it needs, and the disk takes its own.")
     detail: str = Field(default="", description="What it waits for.")
     sessions: Count = Field(default=0, description="Sessions in memory.")
+    unreached: list[str] = Field(default=[], description="Owners that it reads and that have not answered it lately.")
+    mesh: str = Field(default="", description="Id of its data folder: two owners under one key differ in it.")
+    since: Stamp | None = Field(default=None, description="When its process began.")
+    data: str = Field(default="", description="Its data folder.")

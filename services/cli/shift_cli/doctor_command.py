@@ -6,7 +6,7 @@ import json
 import os
 import socket
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -22,8 +22,10 @@ class Finding(NamedTuple):
 def doctor(
     url: Annotated[str, typer.Option(help="The gateway.", envvar="SHIFT_URL")] = "http://127.0.0.1:8080",
     zenoh: Annotated[str, typer.Option(help="The router.", envvar="SHIFT_ZENOH")] = "tcp/127.0.0.1:7447",
-    data: Annotated[Path, typer.Option(help="The data folder.", envvar="SHIFT_DATA")] = Path("data"),
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.")] = False,
+    data: Annotated[
+        Path | None, typer.Option(help="The data folder; left out: the one that the mesh uses.", envvar="SHIFT_DATA")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
 ) -> None:
     """Is everything reachable, and if not, why. Exit code 1 when something is not.
 
@@ -31,7 +33,8 @@ def doctor(
     shift-mesh doctor
     shift-mesh doctor --url http://127.0.0.1:9000 --json
     """
-    findings = [_router(zenoh), *_services(url), _folder(data)]
+    ready, findings = _services(url)
+    findings = [_router(zenoh), *findings, *_links(ready), _folder(data, ready)]
     if as_json:
         typer.echo(json.dumps({"fine": all(f.fine for f in findings), "findings": [f._asdict() for f in findings]}))
     else:
@@ -60,7 +63,7 @@ def _router(zenoh: str) -> Finding:
     return Finding("router", True, zenoh)
 
 
-def _services(url: str) -> list[Finding]:
+def _services(url: str) -> tuple[dict[str, Any], list[Finding]]:
     from shift_runtime.rest_client import RestClient
     from shift_schemas.errors import Unavailable
 
@@ -68,14 +71,26 @@ def _services(url: str) -> list[Finding]:
         with RestClient(url) as shift:
             ready = shift.ready()
     except Unavailable as e:
-        return [Finding("gateway", False, e.detail)]
+        return {}, [Finding("gateway", False, e.detail)]
     services = ready.get("services")
     if not isinstance(services, dict):
-        return [Finding("gateway", False, f"what answers at {url} is no gateway; give the right one with --url")]
-    return [Finding(s, condition == "ready", str(condition)) for s, condition in services.items()]
+        return {}, [Finding("gateway", False, f"what answers at {url} is no gateway; give the right one with --url")]
+    return ready, [Finding(s, condition == "ready", str(condition)) for s, condition in services.items()]
 
 
-def _folder(data: Path) -> Finding:
+def _links(ready: dict[str, Any]) -> list[Finding]:
+    """Each pair of services of which one does not reach the other."""
+    return [Finding("link", False, str(sentence)) for sentence in ready.get("links", ())]
+
+
+def _folder(given: Path | None, ready: dict[str, Any]) -> Finding:
+    """The folder that the mesh uses; without a mesh, the one that is given."""
+    known = sorted(set(ready.get("data", {}).values()))
+    if given is not None and known and str(given.absolute()) not in known:
+        return Finding("data folder", False, f"the mesh uses {' and '.join(known)}, not {given}; leave --data out")
+    data = given or Path(known[0] if known else "data")
+    if known and not data.exists():
+        return Finding("data folder", True, f"{data}, which is not on this machine (a container's, perhaps)")
     if not data.exists():
         return Finding("data folder", False, f"{data} is not there; shift-mesh up makes it, or give --data")
     if not os.access(data, os.W_OK):

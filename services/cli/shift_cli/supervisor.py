@@ -30,6 +30,8 @@ STEADY_S = 3.0
 LONGEST_PAUSE_S = 2.0
 """Before the next try; with the start itself below the 5 s of RELIABILITY.md, row 3."""
 SETTINGS_WRONG = 2
+OWNED_ELSEWHERE = 3
+"""As ``shift_runtime.process`` ends (it is not imported here: this process must open no Zenoh session)."""
 
 
 @dataclass
@@ -97,6 +99,9 @@ class Supervisor:
                 return 0
             for program, status in self._dead():
                 program.ran = program.ran or time.monotonic() - program.started > STEADY_S
+                if os.waitstatus_to_exitcode(status) == OWNED_ELSEWHERE:
+                    self.tell(f"the {program.name} found another mesh on its router; stopping")
+                    return SETTINGS_WRONG
                 if os.waitstatus_to_exitcode(status) == SETTINGS_WRONG and not program.ran:
                     self.tell(f"the {program.name} cannot run with these settings; stopping")
                     return SETTINGS_WRONG

@@ -35,6 +35,7 @@ from shift_gateway.problems import (
     problem_body,
     problem_response,
 )
+from shift_gateway.readiness import readiness
 from shift_gateway.recordings import list_recordings, recording_path
 from shift_gateway.replica import Replica
 from shift_gateway.settings import GatewaySettings
@@ -68,10 +69,10 @@ class Gateway:
     async def on(self, bus: Bus, clock: Clock) -> AsyncIterator[None]:
         """Open the replica and the door on a bus, until left."""
         self.mesh = MeshClient(bus, self.settings.patience_s)
-        self.replica = Replica(bus, self.metrics.dropped)
+        self.replica = Replica(bus, self.metrics.dropped, self.metrics.link_lost)
         self.door = Door(self.mesh, self.replica, clock)
         bus.serve(build_key(ServiceKey("gateway", "health")), lambda r: r.reply(encode(self.health())))
-        bus.serve(build_key(ServiceKey("gateway", "metrics")), lambda r: r.reply(self.metrics.text()))
+        bus.serve(build_key(ServiceKey("gateway", "metrics")), lambda r: r.reply(self.metrics_text()))
         bus.token(build_key(ServiceKey("gateway", "alive")))
         self.replica.reader.start()
         pulling = asyncio.create_task(self.replica.reader.run())
@@ -81,11 +82,22 @@ class Gateway:
             pulling.cancel()
             await bus.close()
 
+    def metrics_text(self) -> bytes:
+        """The gateway's own metrics."""
+        for owner in OWNERS:
+            self.metrics.silent(owner, self.replica.reader.links.silent_s(owner))
+        return self.metrics.text()
+
     def health(self) -> Health:
         """The gateway's own."""
         missing = self.replica.missing
+        unreached = self.replica.reader.links.unreached
         detail = f"waits for the {', the '.join(missing)}" if missing else ""
-        return Health(service="gateway", ready=not missing, detail=detail, sessions=len(self.replica.views))
+        if not detail and unreached:
+            detail = f"the gateway does not reach the {', the '.join(unreached)}"
+        return Health(
+            service="gateway", ready=not detail, detail=detail, sessions=len(self.replica.views), unreached=unreached
+        )
 
 
 def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastAPI:
@@ -357,25 +369,16 @@ def _add_operations(app: FastAPI, gateway: Gateway) -> None:
     async def readyz() -> Response:
         """Whether every service answers and is ready; names those that are not."""
         answers = await asyncio.gather(*(gateway.mesh.health(s) for s in SERVICES))
-        services = {s: _condition(h) for s, h in zip(SERVICES, answers, strict=True)}
-        services["gateway"] = _condition(gateway.health())
-        missing = [s for s, condition in services.items() if condition != "ready"]
-        content = {"ready": not missing, "missing": missing, "services": services}
-        return JSONResponse(content, 503 if missing else 200)
+        content = readiness(dict(zip(SERVICES, answers, strict=True)), gateway.health())
+        return JSONResponse(content, 200 if content["ready"] else 503)
 
     @app.get("/metrics", tags=["operations"])
     async def metrics() -> Response:
         """Prometheus metrics of all services."""
         texts = await asyncio.gather(*(gateway.mesh.metrics(s) for s in (*SERVICES, "ros2_bridge")))
-        text = gathered([gateway.metrics.text(), *(t for t in texts if t)])
+        text = gathered([gateway.metrics_text(), *(t for t in texts if t)])
         return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")
 
     @app.get("/", include_in_schema=False)
     async def page() -> HTMLResponse:
         return HTMLResponse(PAGE)
-
-
-def _condition(health: Health | None) -> str:
-    if health is None:
-        return "does not answer"
-    return "ready" if health.ready else health.detail or "not ready"

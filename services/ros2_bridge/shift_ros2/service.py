@@ -48,7 +48,7 @@ async def serve(settings: BridgeSettings) -> None:
     _on_signal(stop.set)
     bus = await ZenohBus.open(settings.zenoh, settings.listen)
     metrics = Metrics(SERVICE)
-    replica = Replica(bus, metrics.dropped)
+    replica = Replica(bus, metrics.dropped, metrics.link_lost)
     bridge = Bridge(settings, CommandDoor(MeshClient(bus, settings.patience_s), replica), metrics, SystemClock())
     replica.reader.start()
     pulling = asyncio.create_task(replica.reader.run())

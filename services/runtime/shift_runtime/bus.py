@@ -76,6 +76,19 @@ class Bus(Protocol):
     def token(self, key: str) -> Handle:
         """Show that this process is alive, for as long as it is."""
 
+    async def reopen(self) -> None:
+        """Leave and join again, with all that was declared: links that are gone are made anew.
+
+        Requests that are under way may get no answer; whoever asked asks again.
+        """
+
+    async def answers_by_router(self, key: str) -> bool:
+        """Return whether somebody answers under ``key`` to one who is linked to the router only."""
+
+    @property
+    def joined(self) -> bool:
+        """Whether there is any link, to the router or to another process."""
+
     @property
     def dropped(self) -> int:
         """How many arrivals were dropped because too many were waiting."""

@@ -18,6 +18,8 @@ from pathlib import Path
 from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
 
+from shift_runtime.claim import mesh_id
+
 _TABLES = """
 CREATE TABLE IF NOT EXISTS outbox (
     session TEXT, seq INTEGER, subject TEXT, payload TEXT, PRIMARY KEY (session, seq)) WITHOUT ROWID;
@@ -91,6 +93,7 @@ class Journal:
         self.path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            self.mesh = mesh_id(path.parent)
             self._db = sqlite3.connect(path, isolation_level=None, timeout=5.0)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")

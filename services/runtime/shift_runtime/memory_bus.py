@@ -104,6 +104,18 @@ class MemoryBus:
         self._hub.tokens.add(key)
         return self._held(lambda: self._hub.tokens.discard(key))
 
+    async def reopen(self) -> None:
+        """See :class:`~shift_runtime.bus.Bus`: there are no links here that could be gone."""
+
+    async def answers_by_router(self, key: str) -> bool:
+        """See :class:`~shift_runtime.bus.Bus`: there is no router here."""
+        return False
+
+    @property
+    def joined(self) -> bool:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        return True
+
     @property
     def dropped(self) -> int:
         """See :class:`~shift_runtime.bus.Bus`."""

@@ -14,6 +14,7 @@ from shift_schemas.keys import PROCEDURE_OWNER, STREAMS, CommandKey, ServiceKey,
 from shift_schemas.messages import Answer, Command, GazeChunk, Health
 
 from shift_runtime.bus import Bus, Reply, first_answer
+from shift_runtime.claim import healths_of, one_health
 
 ATTEMPT_S = 1.0
 """A request that is lost with a dying router hangs for its whole time; so each attempt is short."""
@@ -49,8 +50,8 @@ class MeshClient:
 
     async def health(self, service: str, timeout_s: float = 1.0) -> Health | None:
         """What the service's worker says of itself; none when it does not answer."""
-        key = build_key(ServiceKey(service, "health"))
-        return await first_answer(self.bus, key, timeout_s=timeout_s, read=_health_of)
+        replies = await self.bus.get(build_key(ServiceKey(service, "health")), timeout_s=timeout_s)
+        return one_health(service, list(healths_of(replies)))
 
     async def metrics(self, service: str, timeout_s: float = 1.0) -> bytes:
         """The service's metrics; empty when it does not answer."""
@@ -75,10 +76,6 @@ class MeshClient:
 
 def _answer_of(reply: Reply) -> Answer | Problem | None:
     return _decoded(Answer, reply) if reply.ok else _decoded(Problem, reply)
-
-
-def _health_of(reply: Reply) -> Health | None:
-    return _decoded(Health, reply) if reply.ok else None
 
 
 def _decoded(kind: type[M], reply: Reply) -> M | None:

@@ -18,6 +18,11 @@ class Metrics:
         self._commands = self._counter("shift_commands", "Commands answered.", ("procedure", "outcome"))
         self._read = self._counter("shift_facts_read", "Facts of other services taken in.", ("subject",))
         self._failed = self._counter("shift_commits_failed", "Commits that the disk refused.", ())
+        self._links_lost = self._counter("shift_links_lost", "Owners that did not answer any more.", ("owner",))
+        self._silent = Gauge(
+            "shift_owner_silent_seconds", "Time since an owner last answered.", ("service", "owner"),
+            registry=self.registry,
+        )  # fmt: skip
         self._sessions = Gauge("shift_sessions", "Sessions in memory.", ("service",), registry=self.registry).labels(
             service
         )
@@ -46,6 +51,14 @@ class Metrics:
     def answered(self, procedure: str, outcome: str) -> None:
         """A command was answered."""
         self._commands.labels(self.service, procedure, outcome).inc()
+
+    def link_lost(self, owner: str) -> None:
+        """An owner does not answer any more."""
+        self._links_lost.labels(self.service, owner).inc()
+
+    def silent(self, owner: str, seconds: float) -> None:
+        """How long ago an owner last answered."""
+        self._silent.labels(self.service, owner).set(seconds)
 
     def commit_failed(self) -> None:
         """The disk refused a commit."""

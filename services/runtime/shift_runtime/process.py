@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import structlog
 from shift_schemas.errors import ShiftError
 
+from shift_runtime.claim import OwnedElsewhere
 from shift_runtime.clock import SystemClock
 from shift_runtime.journal import Journal
 from shift_runtime.logs import configure_logs
@@ -21,6 +22,8 @@ from shift_runtime.worker import Core, Worker
 from shift_runtime.zenoh_bus import ZenohBus
 
 log = structlog.get_logger()
+OWNED_ELSEWHERE = 3
+"""Exit code of a service that found another mesh on its router: to start it again does not help."""
 WorkerKind = Callable[..., Worker[Any]]
 
 
@@ -30,6 +33,9 @@ def run_service(core: Core[Any], kind: WorkerKind = Worker) -> None:
         settings = read_settings()
         configure_logs(core.name, settings)
         run_loop(serve(core, settings, kind))
+    except OwnedElsewhere as e:
+        sys.stderr.write(f"shift_{core.name}: {e.detail}\n")
+        sys.exit(OWNED_ELSEWHERE)
     except ShiftError as e:
         sys.stderr.write(f"shift_{core.name}: {e.detail}\n")
         sys.exit(2)

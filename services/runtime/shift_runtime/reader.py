@@ -17,6 +17,7 @@ from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, buil
 from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxRow
 
 from shift_runtime.bus import Bus, Incoming, Reply, first_answer
+from shift_runtime.links import Links
 
 PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
@@ -67,8 +68,14 @@ class Reader:
     synced: set[str] = field(default_factory=set)
     """Owners whose outbox was read to its end at least once."""
     pages: dict[str, OutboxPage] = field(default_factory=dict)
+    lost: Callable[[str], None] = lambda owner: None
+    """Told of each owner that does not answer any more."""
     _pulls: dict[tuple[str, str | None], asyncio.Task[bool]] = field(default_factory=dict)
     _again: set[tuple[str, str | None]] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        """Know the links to the owners."""
+        self.links = Links(self.bus, self.owners, lambda owner: self.lost(owner))
 
     def start(self) -> None:
         """Listen to the hints."""
@@ -84,6 +91,7 @@ class Reader:
             await asyncio.sleep(FIRST_PAUSE_S)
         while True:
             await asyncio.gather(*(self.pull(owner) for owner in self.owners))
+            await self.links.keep(self.pull)
             await asyncio.sleep(PULL_EVERY_S)
 
     def forget(self, session: str) -> None:
@@ -167,7 +175,10 @@ class Reader:
                 closed=self.closed and owner == "recorder",
             )
             page = await self._page(owner, query)
-            if page is None or not self._taken(owner, page):
+            if page is None:
+                return False
+            self.links.answered(owner)
+            if not self._taken(owner, page):
                 return False
             past |= {s: n for s, n in page.heads.items() if s in self.done}
             if session is not None:

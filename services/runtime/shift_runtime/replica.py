@@ -77,9 +77,11 @@ class View:
 class Replica:
     """All sessions."""
 
-    def __init__(self, bus: Bus, dropped: Callable[[str], None]) -> None:
+    def __init__(
+        self, bus: Bus, dropped: Callable[[str], None], lost: Callable[[str], None] = lambda owner: None
+    ) -> None:
         self.views: dict[str, View] = {}
-        self.reader = Reader(bus, tuple(OWNERS), {}, self._deliver, dropped, closed=True)
+        self.reader = Reader(bus, tuple(OWNERS), {}, self._deliver, dropped, closed=True, lost=lost)
 
     @property
     def missing(self) -> tuple[str, ...]:

@@ -45,6 +45,7 @@ from shift_schemas.stamps import Stamp
 from shift_schemas.step import NotYet, Step
 
 from shift_runtime.bus import Bus, Incoming, Request
+from shift_runtime.claim import Claim
 from shift_runtime.clock import Clock
 from shift_runtime.journal import AnswerKey, Batch, Journal, StoredAnswer, digest_of
 from shift_runtime.metrics import Metrics
@@ -155,8 +156,10 @@ class Worker(Generic[S]):
         self.metrics = metrics
         self.states: dict[str, S | None] = {}
         self.reader = Reader(
-            bus, tuple(core.reads), journal.cursors(), self._deliver, metrics.dropped, done=self._closed_sessions()
-        )
+            bus, tuple(core.reads), journal.cursors(), self._deliver, metrics.dropped, done=self._closed_sessions(),
+            lost=metrics.link_lost,
+        )  # fmt: skip
+        self.claim = Claim(bus, core.name, journal.mesh, clock.now())
         self.processed = dict(self.reader.cursors)
         self._queue: deque[ReadFact | Asked | Callable[[], None]] = deque()
         self._waiting: dict[str, list[Asked]] = {}
@@ -175,10 +178,19 @@ class Worker(Generic[S]):
     # --- life ---
 
     async def run(self) -> None:
-        """Declare the doors, read the journals, and work until :meth:`stop`."""
+        """Declare the doors, read the journals, and work until :meth:`stop`.
+
+        Raises
+        ------
+        OwnedElsewhere
+            Another mesh answers under this service's keys, and was there before.
+        """
+        await self.claim.make()
         self._declare()
         self.reader.start()
         pulling = asyncio.create_task(self.reader.run())
+        claiming = asyncio.create_task(self.claim.keep())
+        claiming.add_done_callback(lambda task: self.stop())
         try:
             await self.on_start()
             while not self._stopping:
@@ -187,8 +199,11 @@ class Worker(Generic[S]):
             self._settle()
             self._commit(self._open)
             self._publish_hints()
+            if claiming.done():
+                claiming.result()
         finally:
             pulling.cancel()
+            claiming.cancel()
 
     def stop(self) -> None:
         """Finish the turn and return from :meth:`run`."""
@@ -262,13 +277,25 @@ class Worker(Generic[S]):
         self.metrics.dropped("overload", dropped - self._overload)
         self._overload = dropped
         self.metrics.sessions(len(self.states))
+        for owner in self.reader.owners:
+            self.metrics.silent(owner, self.reader.links.silent_s(owner))
         request.reply(self.metrics.text())
 
     def health(self) -> Health:
         """This worker's own answer."""
         missing = sorted(set(self.core.reads) - self.reader.synced)
-        detail = self._alarm or (f"waits for the {', the '.join(missing)}" if missing else "")
-        return Health(service=self.core.name, ready=self.ready, detail=detail, sessions=len(self.states))
+        unreached = self.reader.links.unreached
+        reasons = [
+            self._alarm,
+            f"waits for the {', the '.join(missing)}" if missing else "",
+            f"the {self.core.name} does not reach the {', the '.join(unreached)}" if unreached else "",
+            self.claim.conflict,
+        ]
+        return Health(
+            service=self.core.name, ready=self.ready and not any(reasons), detail=next(filter(None, reasons), ""),
+            sessions=len(self.states), unreached=unreached, mesh=self.claim.mesh, since=self.claim.since,
+            data=str(self.journal.path.parent.parent.absolute()),
+        )  # fmt: skip
 
     def _on_command(self, request: Request) -> None:
         try:

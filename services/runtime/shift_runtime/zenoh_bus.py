@@ -27,6 +27,9 @@ T = TypeVar("T")
 CLOSE_WITHIN_S = 2.0
 """Peers that go at the same moment can hold a session's close for ten seconds; nothing hangs on it by then."""
 
+BY_ROUTER_S = 1.0
+"""How long an owner that does not answer directly has to answer by the router."""
+
 NO_REPLY = (b"", b"Timeout")
 """What Zenoh itself puts in the place of a reply that did not come in time."""
 _attached = threading.local()
@@ -88,12 +91,14 @@ class _Request:
 
     def reply(self, payload: bytes) -> None:
         if self.query is not None:
-            self.query.reply(self.key, payload)
+            with contextlib.suppress(zenoh.ZError):  # its session was left meanwhile: who asked asks again
+                self.query.reply(self.key, payload)
             self._done()
 
     def refuse(self, payload: bytes) -> None:
         if self.query is not None:
-            self.query.reply_err(payload)
+            with contextlib.suppress(zenoh.ZError):
+                self.query.reply_err(payload)
             self._done()
 
     def _done(self) -> None:
@@ -104,6 +109,9 @@ class _Request:
 
 @dataclass
 class _Handle:
+    """Something declared, and how to declare it on another session."""
+
+    declare: Callable[[zenoh.Session], Any]
     thing: Any
 
     def close(self) -> None:
@@ -111,12 +119,20 @@ class _Handle:
             self.thing.undeclare()
             self.thing = None
 
+    def move(self, session: zenoh.Session) -> None:
+        if self.thing is not None:
+            self.thing = self.declare(session)
+
 
 class ZenohBus:
     """One Zenoh session. Make it by :meth:`open` within the loop that its handlers are to run in."""
 
-    def __init__(self, session: zenoh.Session, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, session: zenoh.Session, loop: asyncio.AbstractEventLoop, connect: str = "", listen: str = ""
+    ) -> None:
         self.session = session
+        self._connect, self._listen = connect, listen
+        self._moving = asyncio.Lock()
         self._loop = loop
         self._gate = _Gate(loop)
         self._handles: list[_Handle] = []
@@ -130,13 +146,12 @@ class ZenohBus:
         InvalidSettings
             An endpoint is none, or cannot be listened on.
         """
-        mode = "peer" if listen else "client"
         try:
-            session = await asyncio.to_thread(zenoh.open, zenoh_config(mode, connect=connect, listen=listen))
+            session = await _opened(connect, listen)
         except zenoh.ZError as e:
             said = str(e).partition(" at /")[0]
             raise InvalidSettings(f"SHIFT_ZENOH is {connect!r}, SHIFT_LISTEN is {listen!r}: {said}") from e
-        return cls(session, asyncio.get_running_loop())
+        return cls(session, asyncio.get_running_loop(), connect, listen)
 
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
         """See :class:`~shift_runtime.bus.Bus`."""
@@ -201,7 +216,7 @@ class ZenohBus:
                 Incoming(str(sample.key_expr), sample.payload.to_bytes(), attachment.to_bytes() if attachment else b"")
             )
 
-        return self._held(self.session.declare_subscriber(key, direct(on_sample)))
+        return self._held(lambda session: session.declare_subscriber(key, direct(on_sample)))
 
     def serve(self, key: str, handler: Callable[[Request], None], *, limit: int = 10_000) -> Handle:
         """See :class:`~shift_runtime.bus.Bus`."""
@@ -211,11 +226,29 @@ class ZenohBus:
             payload = query.payload
             enqueue(_Request(str(query.key_expr), payload.to_bytes() if payload else b"", query))
 
-        return self._held(self.session.declare_queryable(key, direct(on_query)))
+        return self._held(lambda session: session.declare_queryable(key, direct(on_query)))
 
     def token(self, key: str) -> Handle:
         """See :class:`~shift_runtime.bus.Bus`."""
-        return self._held(self.session.liveliness().declare_token(key))
+        return self._held(lambda session: session.liveliness().declare_token(key))
+
+    async def reopen(self) -> None:
+        """See :class:`~shift_runtime.bus.Bus`. The new session is there before the old one goes."""
+        async with self._moving:
+            session = await _opened(self._connect, self._listen)
+            left, self.session = self.session, session
+            for handle in self._handles:
+                handle.move(session)
+            _leave(left, lambda: None)
+
+    async def answers_by_router(self, key: str) -> bool:
+        """See :class:`~shift_runtime.bus.Bus`. As a client, which has no other link."""
+        return await asyncio.to_thread(_answers, self._connect, key)
+
+    @property
+    def joined(self) -> bool:
+        """See :class:`~shift_runtime.bus.Bus`."""
+        return bool(self.session.info.routers_zid() or self.session.info.peers_zid())
 
     @property
     def dropped(self) -> int:
@@ -230,17 +263,42 @@ class ZenohBus:
         self._handles.clear()
         closed = asyncio.Event()
 
-        def close() -> None:
-            with contextlib.suppress(zenoh.ZError):  # "timed out": a peer went at the same moment
-                self.session.close()  # type: ignore[no-untyped-call]
+        def done() -> None:
             with contextlib.suppress(RuntimeError):  # the loop did not wait for us
                 self._loop.call_soon_threadsafe(closed.set)
 
-        threading.Thread(target=close, name="zenoh-close", daemon=True).start()
+        _leave(self.session, done)
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(closed.wait(), CLOSE_WITHIN_S)
 
-    def _held(self, thing: Any) -> Handle:
-        handle = _Handle(thing)
+    def _held(self, declare: Callable[[zenoh.Session], Any]) -> Handle:
+        handle = _Handle(declare, declare(self.session))
         self._handles.append(handle)
         return handle
+
+
+async def _opened(connect: str, listen: str) -> zenoh.Session:
+    mode = "peer" if listen else "client"
+    return await asyncio.to_thread(zenoh.open, zenoh_config(mode, connect=connect, listen=listen))
+
+
+def _leave(session: zenoh.Session, then: Callable[[], None]) -> None:
+    """Close a session in a thread of its own: peers that go at the same moment can hold it for ten seconds."""
+
+    def close() -> None:
+        with contextlib.suppress(zenoh.ZError):  # "timed out": a peer went at the same moment
+            session.close()  # type: ignore[no-untyped-call]
+        then()
+
+    threading.Thread(target=close, name="zenoh-close", daemon=True).start()
+
+
+def _answers(connect: str, key: str) -> bool:
+    try:
+        session = zenoh.open(zenoh_config("client", connect=connect, timeout_ms=round(1000 * BY_ROUTER_S)))
+    except zenoh.ZError:
+        return False
+    try:
+        return any(reply.ok is not None for reply in session.get(key, timeout=BY_ROUTER_S))
+    finally:
+        _leave(session, lambda: None)
