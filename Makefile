@@ -8,7 +8,7 @@ IMAGE ?= shift-mesh
 BASE  ?= python:3.11-slim-bookworm
 
 .DEFAULT_GOAL := help
-.PHONY: help setup setup-dev up test lint bench image lock clean
+.PHONY: help setup setup-dev up test lint bench campaign-suspend image lock clean
 
 help:           ## This list
 	@sed -nE 's/^([a-z][a-z-]*):[^#]*## (.*)/make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 14
@@ -39,6 +39,9 @@ bench: setup-dev                        ## Each program in benchmarks/
 	@set -e; for program in $(wildcard benchmarks/[a-z]*.py); do \
 	    echo "== $$program"; $(BIN)/python "$$program"; \
 	done
+
+campaign-suspend: setup-dev             ## Each process suspended under traffic, for half an hour; ARGS="--times 2"
+	@$(BIN)/python tests/faults/suspended.py $(ARGS)
 
 image:                                  ## The container image; IMAGE=name, BASE=another Python 3.11+
 	docker build --tag $(IMAGE) --build-arg BASE=$(BASE) --file deploy/Dockerfile .
