@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 from shift_recorder.reading import Recording
-from shift_recorder.replay import Pacer, Replay, check_free, extent_of, play, replay_session
+from shift_recorder.replay import Pacer, Replay, TimeLine, check_free, extent_of, play, replay_session
 from shift_runtime.bus import Incoming, Request
 from shift_runtime.memory_bus import Hub, MemoryBus
 from shift_runtime.reader import Reader, ReadFact
@@ -19,6 +19,7 @@ from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, U
 from shift_schemas.ids import is_id
 from shift_schemas.keys import OWNERS
 from shift_schemas.messages import OutboxPage
+from shift_schemas.stamps import NS
 from verify_sessions import Session
 
 RATE = 200.0
@@ -202,3 +203,12 @@ def test_no_file_and_an_empty_recording_are_said(tmp_path: Path) -> None:
     session.recorded.clear()
     with pytest.raises(DamagedRecording, match="no messages"):
         extent_of(session.segment(tmp_path))
+
+
+def test_pauses_longer_than_the_longest_are_shortened_and_steps_back_left_out() -> None:
+    line = TimeLine(10.0)
+    times = [0, NS, 2 * NS, 2 * NS + 365 * 86400 * NS, NS, 2 * NS]
+    assert [line.position_s(1_700_000_000 * NS + t) for t in times] == [0.0, 1.0, 2.0, 12.0, 12.0, 13.0]
+    assert (line.shortened, line.left_out_ns) == (1, 365 * 86400 * NS - 10 * NS)
+    unlimited = TimeLine(0.0)
+    assert [unlimited.position_s(t * NS) for t in (0, 50)] == [0.0, 50.0]

@@ -16,7 +16,7 @@ import pytest
 from runtime_fixtures import row
 from shift_runtime.journal import LOG_PAGES, PAGE_BYTES, Batch, Journal, StoredAnswer, digest_of
 from shift_schemas.errors import InvalidSettings, Unavailable
-from shift_schemas.messages import OutboxPage, OutboxQuery
+from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
 
 START = ("s1", "start_session", "start")
 
@@ -305,3 +305,33 @@ def test_the_file_is_durable_at_each_commit(path: Path) -> None:
     assert reading.execute("PRAGMA journal_mode").fetchone() == ("wal",)
     assert opened(path)._db.execute("PRAGMA synchronous").fetchone() == (2,)
     reading.close()
+
+
+def test_facts_are_found_by_their_fields_through_an_index(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "monitor.sqlite", "monitor", {"gaze": ("source", "seq")})
+    payloads = [f'{{"source":"{source}","seq":{n}}}' for n in (0, 1, 0, 2**53) for source in "ab"]
+    rows = [OutboxRow(session="s1", seq=n, subject="gaze", payload=p) for n, p in enumerate(payloads, start=1)]
+    journal.commit(Batch(states={"s1": "{}"}, rows=rows))
+    found = {(s, n): journal.recorded("s1", "gaze", {"source": s, "seq": n}) for s in "ab" for n in (0, 1, 2, 2**53)}
+    assert found == {(s, n): [p for p in payloads if p == f'{{"source":"{s}","seq":{n}}}'] for s, n in found}
+    assert journal.recorded("s2", "gaze", {"source": "a", "seq": 0}) == []
+    plan = sqlite3.connect(tmp_path / "monitor.sqlite").execute(
+        "EXPLAIN QUERY PLAN SELECT seq FROM outbox INDEXED BY outbox_gaze WHERE session = 's1' AND subject = 'gaze'"
+        " AND json_extract(payload, '$.source') = 'a' AND json_extract(payload, '$.seq') = 1"
+    )
+    assert "outbox_gaze" in str(plan.fetchall())
+
+
+def test_a_damaged_journal_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "monitor.sqlite"
+    journal = Journal(path, "monitor")
+    rows = [OutboxRow(session="s1", seq=n, subject="gaze", payload="x" * 900) for n in range(1, 200)]
+    journal.commit(Batch(states={"s1": "{}"}, rows=rows))
+    journal.close()
+    whole = path.read_bytes()
+    for start in (0, 4096, len(whole) // 2):
+        copy = tmp_path / f"copy-{start}" / path.name
+        copy.parent.mkdir()
+        copy.write_bytes(whole[:start] + bytes(4096 * 4) + whole[start + 4096 * 4 :])
+        with pytest.raises(InvalidSettings, match="copied while a mesh used it"):
+            Journal(copy, "monitor")

@@ -447,3 +447,27 @@ def test_any_interleaving_delivers_1_to_n_in_order_once(events: list[Any], most:
             assert delivered[session] == list(range(1, len(rows) + 1))
 
     run(test())
+
+
+async def older_journal_is_named() -> None:
+    hub = Hub()
+    reader = Reader(MemoryBus(hub), ("learner",), {("s1", "learner"): 7}, lambda read: None, lambda reason: None)
+    heads = {"s1": 3}
+
+    def answer(request: Request) -> None:
+        request.reply(encode(OutboxPage(owner="learner", rows=[], heads=heads, complete=True)))
+
+    MemoryBus(hub).serve("shift/v1/@service/learner/outbox", answer)
+    await reader.pull("learner")
+    (said,) = reader.misfits.values()
+    assert "session s1: the learner's journal ends at message 3, and 7 of its messages were read before" in said
+    heads["s1"] = 7
+    await reader.pull("learner")
+    assert reader.misfits == {}
+    heads.clear()
+    await reader.pull("learner")
+    assert "ends at message 0" in next(iter(reader.misfits.values()))
+
+
+def test_a_journal_that_is_older_than_what_was_read_of_it_is_named() -> None:
+    asyncio.run(older_journal_is_named())

@@ -64,7 +64,8 @@ def _counts(found: RecordingInfo) -> Table:
 
     table = Table("topic or attachment", "messages", "bytes")
     for topic, n in found.counts.items():
-        table.add_row(escape(topic), str(n), "")
+        samples = f" chunks, {found.gaze_samples} samples" if topic == "gaze" else ""
+        table.add_row(escape(topic), f"{n}{samples}", "")
     for name, size in found.attachments.items():
         table.add_row(escape(name), "", f"{size:,}")
     return table

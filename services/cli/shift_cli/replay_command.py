@@ -19,11 +19,14 @@ START_KEYS, TOGGLE_KEYS = "\n\r", "p "
 
 def replay(
     file: Annotated[Path, typer.Argument(help="The recording.", exists=True, dir_okay=False, envvar="SHIFT_FILE")],
-    rate: Annotated[float, typer.Option(help="Times real time.", envvar="SHIFT_RATE")] = 1.0,
+    speed: Annotated[float, typer.Option("--speed", "--rate", help="Times real time.", envvar="SHIFT_SPEED")] = 1.0,
     loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end.", envvar="SHIFT_LOOP")] = False,
     start_offset: Annotated[
         float, typer.Option(help="Begin so many seconds into the recording.", envvar="SHIFT_START_OFFSET")
     ] = 0.0,
+    longest_pause: Annotated[
+        float, typer.Option(help="Shorten longer pauses to so many seconds; 0: none.", envvar="SHIFT_LONGEST_PAUSE")
+    ] = 10.0,
     topics: Annotated[str, typer.Option(help="Only these, with commas between.", envvar="SHIFT_TOPICS")] = "",
     start_paused: Annotated[
         bool, typer.Option("--start-paused", help="Wait for Enter.", envvar="SHIFT_START_PAUSED")
@@ -42,7 +45,7 @@ def replay(
 
     \b
     shift-mesh replay data/recordings/s1.mcap
-    shift-mesh replay s1.mcap --rate 10 --topics decision,performance
+    shift-mesh replay s1.mcap --speed 10 --topics decision,performance
     shift-mesh replay s1.mcap --start-offset 60 --start-paused --session again
     """
     import asyncio
@@ -51,11 +54,17 @@ def replay(
     from shift_schemas.errors import Conflict
     from shift_schemas.keys import SUBJECTS
 
-    extent = extent_of(file)
+    extent = extent_of(file, longest_pause)
     wanted = tuple(name.strip() for name in topics.split(",") if name.strip()) or SUBJECTS
-    plan = Replay(file, session or replay_session(extent.session), rate, start_offset, wanted, loop)
+    plan = Replay(file, session or replay_session(extent.session), speed, start_offset, wanted, loop, longest_pause)
     if plan.session == extent.session:
         raise Conflict(f"{plan.session} is the recorded session itself; a replay needs another name")
+    if extent.shortened:
+        typer.echo(
+            f"{extent.shortened} pauses are shortened to {longest_pause:g} s each, which leaves out "
+            f"{extent.left_out_s:.0f} s (--longest-pause 0 keeps them)",
+            err=True,
+        )
     published = asyncio.run(_run(plan, extent, zenoh, start_paused))
     typer.echo(f"{published} messages replayed under session {plan.session}", err=True)
 

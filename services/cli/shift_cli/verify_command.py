@@ -48,6 +48,8 @@ def _show(report: VerifyReport) -> None:
     if not report.complete and report.reason:
         typer.echo(f"incomplete: {report.reason}")
     if report.difference is not None:
-        typer.echo(f"first difference: {report.difference.sentence}")
+        typer.echo(f"NOT VERIFIED: the first difference is in {report.difference.sentence}")
+    elif report.complete:
+        typer.echo("VERIFIED: no difference")
     else:
-        typer.echo("no difference" if report.complete else "no difference in what is there")
+        typer.echo("VERIFIED as far as it goes: no difference in what is there; the recording is not complete")

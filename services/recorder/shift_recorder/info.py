@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -22,7 +23,8 @@ class RecordingInfo:
     """One recording.
 
     ``complete`` is whether the session ended and the file is whole; ``reason`` says why it is not, or how
-    it is damaged. ``duration_s`` is from the first message's recording to the last one's.
+    it is damaged. ``duration_s`` is from the session's start to its end; of one that has not ended, from the first
+    message's recording to the last one's. ``gaze_samples`` are those of all chunks of gaze.
     """
 
     file: str
@@ -38,6 +40,7 @@ class RecordingInfo:
     ended: str
     duration_s: float
     counts: dict[str, int]
+    gaze_samples: int
     attachments: dict[str, int]
     metadata: dict[str, dict[str, str]]
     checksum: str
@@ -60,6 +63,7 @@ class _Scanned:
     first: int = 0
     last: int = 0
     session: Session | None = None
+    samples: int = 0
 
 
 def info_of(path: Path) -> RecordingInfo:
@@ -87,8 +91,9 @@ def info_of(path: Path) -> RecordingInfo:
         state=fact.state if fact else "",
         started=_iso(fact.started.ns) if fact else "",
         ended=_iso(fact.ended.ns) if fact and fact.ended else "",
-        duration_s=max(0, scanned.last - scanned.first) / NS,
+        duration_s=_duration_s(fact, scanned),
         counts=dict(scanned.counts),
+        gaze_samples=scanned.samples,
         attachments={name: len(a.data) for name, a in recording.attachments.items()},
         metadata=recording.metadata,
         checksum=checksum,
@@ -112,12 +117,20 @@ def _scanned(recording: Recording) -> _Scanned:
             found.counts[message.topic] += 1
             found.first = found.first or message.log_time
             found.last = message.log_time
+            if message.topic == "gaze":
+                found.samples += len(json.loads(message.data)["t"])
             if message.topic == "session":
                 fact = fact_of(message.topic, message.data)
                 found.session = fact if isinstance(fact, Session) else found.session
-    except (DamagedRecording, MalformedMessage):
+    except (DamagedRecording, MalformedMessage, ValueError, KeyError, TypeError):
         pass  # the report has it
     return found
+
+
+def _duration_s(fact: Session | None, scanned: _Scanned) -> float:
+    if fact is not None and fact.ended is not None:
+        return max(0, fact.ended.ns - fact.started.ns) / NS
+    return max(0, scanned.last - scanned.first) / NS
 
 
 def _iso(ns: int) -> str:

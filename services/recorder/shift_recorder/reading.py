@@ -112,11 +112,8 @@ class Recording:
 
     def facts(self, topics: Collection[str] | None = None) -> Iterator[RecordedFact]:
         """The messages as the facts that they are. Raises as :meth:`messages`, also for a payload that is none."""
-        for m in self.messages(topics):
-            try:
-                yield RecordedFact(m.sequence, m.log_time, fact_of(m.topic, m.data))
-            except MalformedMessage as e:
-                raise DamagedRecording(f"{self.path.name}: {m.topic} {m.sequence}: {e.detail}") from e
+        for message in self.messages(topics):
+            yield recorded_fact(self.path, message)
 
     def located(self, topics: Collection[str] | None = None) -> Iterator[Located]:
         """As :meth:`messages`, with where each of them is."""
@@ -201,6 +198,14 @@ def facts(path: Path) -> Iterator[RecordedFact]:
     Of a file that is cut off these just end; where that matters, ask the :class:`Recording`.
     """
     return Recording(path).facts()
+
+
+def recorded_fact(path: Path, m: RecordedMessage) -> RecordedFact:
+    """Return the fact that a message of the recording at ``path`` is. Raises :class:`DamagedRecording`."""
+    try:
+        return RecordedFact(m.sequence, m.log_time, fact_of(m.topic, m.data))
+    except MalformedMessage as e:
+        raise DamagedRecording(f"{path.name}: {m.topic} {m.sequence}: {e.detail}") from e
 
 
 def fact_of(topic: str, data: bytes) -> Fact:

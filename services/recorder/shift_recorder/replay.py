@@ -23,9 +23,11 @@ from shift_schemas.keys import SUBJECTS, FactKey, ServiceKey, build_key
 from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, Session
 from shift_schemas.stamps import NS
 
-from shift_recorder.reading import RecordedFact, Recording
+from shift_recorder.reading import RecordedFact, Recording, recorded_fact
 
 LONGEST_ID = 63
+LONGEST_PAUSE_S = 10.0
+"""Chosen: longer than the pauses of an interaction, and nobody waits through a step of the clock or a lunch break."""
 Progress = Callable[[float, int], None]
 """Told the position in the recording, s, and how many facts were published."""
 
@@ -53,27 +55,57 @@ class Replay:
     start_offset_s: float = 0.0
     topics: tuple[str, ...] = SUBJECTS
     loop: bool = False
+    longest_pause_s: float = LONGEST_PAUSE_S
+    """A longer pause of the recording is shortened to this; 0: none is."""
 
     def __post_init__(self) -> None:
         """Check it."""
         if not is_id(self.session):
             raise MalformedMessage(f"{shorten(self.session)!r} is no id: {ID_RULE}")
         if not 0 < self.rate <= 10_000:
-            raise MalformedMessage(f"a rate of {self.rate:g} cannot be; write a number above 0, 1 for real time")
+            raise MalformedMessage(f"a speed of {self.rate:g} is not valid; write a number above 0, 1 for real time")
         if not 0 <= self.start_offset_s < 1e9:
             raise MalformedMessage(f"a start {self.start_offset_s:g} s into the recording cannot be")
+        if not 0 <= self.longest_pause_s < 1e9:
+            raise MalformedMessage(f"a longest pause of {self.longest_pause_s:g} s is not valid; write 0 for no limit")
         if unknown := [topic for topic in self.topics if topic not in SUBJECTS]:
             raise MalformedMessage(f"{shorten(unknown[0])!r} is no topic; there are {', '.join(SUBJECTS)}")
 
 
 @dataclass(frozen=True)
 class Extent:
-    """Of a recording: whose it is, when it begins, ns, and how long it is, s."""
+    """Of a recording: whose it is, and how long it is on its time line, s.
+
+    ``shortened`` counts the pauses that were longer than the longest one; ``left_out_s`` is what they were longer.
+    """
 
     session: str
-    first_ns: int
     length_s: float
     topics: Collection[str]
+    shortened: int = 0
+    left_out_s: float = 0.0
+
+
+class TimeLine:
+    """Positions on a recording's time line, s, message after message. Long pauses are shortened."""
+
+    def __init__(self, longest_pause_s: float) -> None:
+        self._longest_ns = round(longest_pause_s * NS)
+        self._last: int | None = None
+        self._at_ns = 0
+        self.shortened = 0
+        self.left_out_ns = 0
+
+    def position_s(self, log_time: int) -> float:
+        """Return the position of the next message."""
+        passed = 0 if self._last is None else max(log_time - self._last, 0)
+        if self._longest_ns and passed > self._longest_ns:
+            self.shortened += 1
+            self.left_out_ns += passed - self._longest_ns
+            passed = self._longest_ns
+        self._last = log_time
+        self._at_ns += passed
+        return self._at_ns / NS
 
 
 class Pacer:
@@ -132,7 +164,7 @@ def replay_session(recorded: str) -> str:
     return f"replay-{recorded[: LONGEST_ID - len('replay-') - len(tail) - 1]}-{tail}"
 
 
-def extent_of(path: Path) -> Extent:
+def extent_of(path: Path, longest_pause_s: float = LONGEST_PAUSE_S) -> Extent:
     """One pass over the recording.
 
     Raises
@@ -142,15 +174,15 @@ def extent_of(path: Path) -> Extent:
     UnknownThing
         There is no such file.
     """
-    recording, first, last, session = Recording(path), 0, 0, ""
+    recording, line, length_s = Recording(path), TimeLine(longest_pause_s), 0.0
     topics = set()
     for message in recording.messages():
-        first, last = first or message.log_time, max(last, message.log_time)
+        length_s = line.position_s(message.log_time)
         topics.add(message.topic)
     session = recording.metadata.get("shift:session", {}).get("session", "")
     if not topics:
         raise DamagedRecording(f"{path.name} holds no messages")
-    return Extent(session, first, (last - first) / NS, frozenset(topics))
+    return Extent(session, length_s, frozenset(topics), line.shortened, line.left_out_ns / NS)
 
 
 async def check_free(bus: Bus, session: str) -> None:
@@ -181,7 +213,7 @@ async def _timed(replay: Replay, extent: Extent, pacer: Pacer) -> AsyncIterator[
     while True:
         pacer.seek(replay.start_offset_s)
         count = 0
-        for position_s, recorded in _from_offset(replay, extent):
+        for position_s, recorded in _from_offset(replay):
             await pacer.until(position_s)
             count += 1
             yield position_s, recorded
@@ -193,11 +225,12 @@ async def _timed(replay: Replay, extent: Extent, pacer: Pacer) -> AsyncIterator[
         await asyncio.sleep(0)
 
 
-def _from_offset(replay: Replay, extent: Extent) -> Iterator[tuple[float, RecordedFact]]:
-    for recorded in Recording(replay.path).facts(replay.topics):
-        position_s = (recorded.log_time - extent.first_ns) / NS
-        if position_s >= replay.start_offset_s:
-            yield position_s, recorded
+def _from_offset(replay: Replay) -> Iterator[tuple[float, RecordedFact]]:
+    line = TimeLine(replay.longest_pause_s)
+    for message in Recording(replay.path).messages():
+        position_s = line.position_s(message.log_time)
+        if position_s >= replay.start_offset_s and message.topic in replay.topics:
+            yield position_s, recorded_fact(replay.path, message)
 
 
 def _publish(put: Publish, replay: Replay, recorded: RecordedFact) -> None:

@@ -29,6 +29,7 @@ CREATE TABLE IF NOT EXISTS state (session TEXT PRIMARY KEY, data TEXT, closed IN
 CREATE TABLE IF NOT EXISTS answer (
     session TEXT, procedure TEXT, command_id TEXT, digest TEXT, result TEXT,
     PRIMARY KEY (session, procedure, command_id)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS place (one INTEGER PRIMARY KEY, file TEXT);
 """
 
 LOG_PAGES, PAGE_BYTES = 1000, 4096
@@ -91,6 +92,7 @@ class Journal:
         """
         self.owner = owner
         self.path = path
+        self._lookups = lookups or {}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self.mesh = mesh_id(path.parent)
@@ -98,20 +100,47 @@ class Journal:
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
             self._db.executescript(_TABLES)
-            for subject, fields in (lookups or {}).items():
+            self._check_copy()
+            self.heads = self._heads()
+            for subject, fields in self._lookups.items():
                 self._db.execute(_index(subject, fields))
             self._grow_log()
         except (sqlite3.Error, OSError) as e:
-            raise InvalidSettings(f"the journal {path} cannot be opened: {e}; set SHIFT_DATA to a folder for it") from e
-        self.heads: dict[str, int] = dict(
-            self._db.execute(  # one look-up a session: the rows of a long study are not all read
+            what = (
+                "it is damaged, perhaps since its data folder was copied while a mesh used it; copy it again"
+                if isinstance(e, sqlite3.DatabaseError) and not isinstance(e, sqlite3.OperationalError)
+                else "set SHIFT_DATA to a folder for it"
+            )
+            raise InvalidSettings(f"the journal {path} cannot be opened: {e}; {what}") from e
+        self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
+        self._answered: dict[str, set[tuple[str, str]]] = {}
+        """Procedures and ids of the commands that were carried out, of the sessions where somebody asked."""
+
+    def _heads(self) -> dict[str, int]:
+        """Return each session's last number; one look-up a session, so that a long study's rows are not all read."""
+        return dict(
+            self._db.execute(
                 "SELECT session, (SELECT MAX(seq) FROM outbox WHERE outbox.session = state.session) AS head"
                 " FROM state WHERE head IS NOT NULL"
             )
         )
-        self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
-        self._answered: dict[str, set[tuple[str, str]]] = {}
-        """Procedures and ids of the commands that were carried out, of the sessions where somebody asked."""
+
+    def _check_copy(self) -> None:
+        """Look through a file that is a copy, once: one that was copied while it was written can be damaged.
+
+        Measured: 0.13 s for 94 MB. A file in its old place is not looked through; its log sees to it.
+        """
+        found = os.stat(self.path)
+        place = f"{found.st_dev}:{found.st_ino}"
+        if self._db.execute("SELECT file FROM place").fetchone() == (place,):
+            return
+        (said,) = self._db.execute("PRAGMA quick_check(1)").fetchone()
+        if said != "ok":
+            raise InvalidSettings(
+                f"the journal {self.path} is damaged ({said}): its data folder was copied while a mesh used it, or "
+                "the disk is faulty; stop the mesh and copy the folder again, or go on with the original"
+            )
+        self._db.execute("INSERT OR REPLACE INTO place VALUES (1, ?)", (place,))
 
     def _grow_log(self) -> None:
         """Give the write-ahead log its full length now: a commit that overwrites syncs faster than one that appends.
@@ -179,11 +208,12 @@ class Journal:
         ``fields`` are those of the subject's look-up, in its order.
         """
         where = "".join(f" AND json_extract(payload, '$.{name}') = ?" for name in fields)
+        index = f"INDEXED BY outbox_{subject}" if subject in self._lookups else ""  # else SQLite goes by the session
         rows = self._db.execute(
-            f"SELECT payload FROM outbox WHERE session = ? AND subject = '{subject}'{where} ORDER BY seq",
+            f"SELECT seq, payload FROM outbox {index} WHERE session = ? AND subject = '{subject}'{where}",
             (session, *fields.values()),
         )
-        return [payload for (payload,) in rows]
+        return [payload for _, payload in sorted(rows)]
 
     # --- writing ---
 

@@ -11,6 +11,7 @@ import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+import structlog
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, build_key, parse_key
@@ -18,6 +19,8 @@ from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxR
 
 from shift_runtime.bus import Bus, Incoming, Reply, first_answer
 from shift_runtime.links import Links
+
+log = structlog.get_logger()
 
 PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
@@ -68,6 +71,8 @@ class Reader:
     synced: set[str] = field(default_factory=set)
     """Owners whose outbox was read to its end at least once."""
     pages: dict[str, OutboxPage] = field(default_factory=dict)
+    misfits: dict[tuple[str, str], str] = field(default_factory=dict)
+    """Owner and session -> a sentence, where the owner's journal is older than what was read of it."""
     lost: Callable[[str], None] = lambda owner: None
     """Told of each owner that does not answer any more."""
     _pulls: dict[tuple[str, str | None], asyncio.Task[bool]] = field(default_factory=dict)
@@ -178,6 +183,7 @@ class Reader:
             if page is None:
                 return False
             self.links.answered(owner)
+            self._compare(owner, page, session)
             if not self._taken(owner, page):
                 return False
             past |= {s: n for s, n in page.heads.items() if s in self.done}
@@ -187,6 +193,23 @@ class Reader:
                 if session is None and knows_sessions:  # else a session's facts may have been held back
                     self.synced.add(owner)
                 return True
+
+    def _compare(self, owner: str, page: OutboxPage, only: str | None) -> None:
+        """Notice a journal that is older than what was read of it: its folder was copied while a mesh used it."""
+        for (session, of), read in self.cursors.items():
+            if of != owner or only not in (None, session):
+                continue
+            head = page.heads.get(session, 0)
+            if read <= head:
+                self.misfits.pop((owner, session), None)
+            elif (owner, session) not in self.misfits:
+                said = (
+                    f"session {session}: the {owner}'s journal ends at message {head}, and {read} of its messages were "
+                    "read before: the data folder was copied while a mesh used it; stop the mesh and copy the folder "
+                    "again, or go on with the original"
+                )
+                self.misfits[owner, session] = said
+                log.error("journals do not fit together", detail=said)
 
     def _taken(self, owner: str, page: OutboxPage) -> bool:
         """Take a page in; whether to go on. What is held back is asked for later, not again and again."""

@@ -290,6 +290,7 @@ class Worker(Generic[S]):
             f"waits for the {', the '.join(missing)}" if missing else "",
             f"the {self.core.name} does not reach the {', the '.join(unreached)}" if unreached else "",
             self.claim.conflict,
+            next(iter(self.reader.misfits.values()), ""),
         ]
         return Health(
             service=self.core.name, ready=self.ready and not any(reasons), detail=next(filter(None, reasons), ""),
