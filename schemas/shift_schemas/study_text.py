@@ -16,7 +16,7 @@ from typing import Any, get_args, get_origin
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from shift_schemas.errors import FieldError, InvalidStudy, shorten
+from shift_schemas.errors import FieldError, InvalidStudy, id_mistake, shorten
 from shift_schemas.study import DEFAULT_STRATEGIES, DEFAULT_TABLE, Study, merge_patch
 
 Path = tuple[str | int, ...]
@@ -191,6 +191,8 @@ def _rule(found: Any, path: Path, value: str) -> str:
         near = difflib.get_close_matches(str(path[-1]), known, n=1)
         meant = f"write {near[0]!r}" if near else f"write one of {', '.join(known)}"
         return f"{shorten(str(path[-1]))!r} is no key here; {meant}"
+    if (wrong_id := id_mistake(found)) is not None:
+        return wrong_id
     if found["type"] == "missing":
         return "it is missing; write it"
     if found["type"] == "value_error":

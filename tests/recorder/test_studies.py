@@ -54,7 +54,7 @@ def test_an_unknown_name_is_refused_with_those_that_there_are(tmp_path: Path) ->
 )
 def test_a_name_that_is_no_id_is_refused_and_no_file_is_looked_for(tmp_path: Path, name: str) -> None:
     (tmp_path / "own.yaml").write_text("study: own\n")
-    with pytest.raises(InvalidStudy, match="name is an id") as refused:
+    with pytest.raises(InvalidStudy, match="is not an id") as refused:
         study_named(name, tmp_path / "inner")
     assert len(refused.value.detail) < 300
 

@@ -174,7 +174,7 @@ def test_parts_that_do_not_fit_together_are_named_with_their_values() -> None:
         ("aois: [{name: a, rectangle: [0, 0, 1, 1.5]}]", 2, "less than or equal to 1"),
         ("conditions:\n  a: {tasks: [x]}", 3, "overrides tasks; it can override attention"),
         ("conditions:\n  a:\n    reward: {decay: -1}", 4, "'-1' does not do"),
-        ("conditions: {'a/b': {}}", 2, "match pattern"),
+        ("conditions: {'a/b': {}}", 2, "for example a-b"),
         ("scoring: {strategies: {p: {levels: [a, b], thresholds: [0.5]}}}", 2, "for each of negation, hesitation, p;"),
     ):  # fmt: skip
         with pytest.raises(InvalidStudy) as refused:

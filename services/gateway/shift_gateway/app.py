@@ -16,7 +16,7 @@ from shift_runtime.clock import Clock
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
 from shift_schemas.codec import encode
-from shift_schemas.errors import ShiftError, UnknownThing
+from shift_schemas.errors import ShiftError, UnknownThing, check_id
 from shift_schemas.keys import OWNERS, ServiceKey, build_key
 from shift_schemas.messages import Fact, GazeChunk, Health
 from starlette.exceptions import HTTPException
@@ -29,7 +29,6 @@ from shift_gateway.problems import (
     PROBLEM_RESPONSE,
     BodyLimit,
     body,
-    check_id,
     check_size,
     message,
     problem_body,

@@ -8,8 +8,7 @@ from typing import Any, TypeVar
 from fastapi import Request
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ValidationError
-from shift_schemas.errors import FieldError, MalformedMessage, Problem, ShiftError, TooLarge, malformed, shorten
-from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.errors import FieldError, Problem, ShiftError, TooLarge, malformed
 from shift_schemas.strict_json import parse_json
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -55,14 +54,6 @@ def problem_response(error: ShiftError) -> JSONResponse:
     """The response of an error."""
     headers = {"Retry-After": "1"} if error.status == HTTPStatus.SERVICE_UNAVAILABLE else None
     return JSONResponse(problem_body(error), error.status, headers=headers, media_type=MEDIA_TYPE)
-
-
-def check_id(name: str, value: str) -> str:
-    """``value``, or :class:`MalformedMessage` that says what an id is."""
-    if not is_id(value):
-        error = FieldError(field=name, value=shorten(value), rule=ID_RULE)
-        raise MalformedMessage(f"{name}: {ID_RULE}", (error,))
-    return value
 
 
 def check_size(size: int) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.ids import is_id, not_an_id
 from shift_schemas.study_text import parse_study, study_data
 
 
@@ -22,7 +22,7 @@ def study_named(name: str, folder: Path) -> dict[str, Any]:
         There is none of that name (those that there are are named), or its file has a mistake.
     """
     if not is_id(name):
-        raise _refused(name, f"a study's name is an id: {ID_RULE}")
+        raise _refused(name, not_an_id(name))
     for stem, path in _files(folder):
         if stem == name:
             return study_data(parse_study(_text(path), path.name))
