@@ -111,7 +111,8 @@ def test_hosts_and_origins_are_read_from_comma_separated_variables(monkeypatch: 
 
 @pytest.mark.parametrize(
     ("name", "value", "says"),
-    [("ORIGINS", "*", "every web page"), ("ORIGINS", "null", "every web page"), ("ORIGINS", "lab.example.org", "scheme"),
+    [("ORIGINS", "*", "every web page"), ("ORIGINS", "null", "every web page"),
+     ("ORIGINS", "lab.example.org", "scheme"),
      ("ORIGINS", "https://lab.example.org/page", "scheme"), ("HOSTS", "http://gateway", "not a host name"),
      ("HOSTS", "*", "not a host name")],
 )  # fmt: skip

@@ -106,9 +106,9 @@ def _form(text: str) -> str:
 
 
 def _other_quotes(text: str) -> str:
-    if re.match(r"[\[{]\s*'", text):
+    if re.match(r"[\[{][\[{\s]*'", text):
         return "it has single quotes, as Python prints a dict; write it with json.dumps, with double quotes"
-    if re.match(r"[\[{]\s*[“”„]", text):
+    if re.match(r"[\[{][\[{\s]*[“”„]", text):
         return 'it has typographic quotes; write straight ones (")'
     if re.match(r"\{\s*[A-Za-z_]\w*\s*:", text):
         return 'its names have no quotes (a shell may have taken them); write {"name": "value"}'
