@@ -10,6 +10,9 @@ import re
 from typing import Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from shift_schemas.ids import ID_PATTERN, is_id, not_an_id
 
 VALUE_LENGTH = 80
 """How much of a refused value is said back: enough to find it, too little to echo an attack."""
@@ -149,12 +152,34 @@ _BRANCH = re.compile(r"constrained-str|[a-z-]+\[.*\]", re.DOTALL)
 def field_errors(error: ValidationError, prefix: str = "") -> tuple[FieldError, ...]:
     """Pydantic's complaints as field errors, at most twenty of them."""
     found = []
-    for e in error.errors(include_url=False, include_context=False)[:20]:
+    for e in error.errors(include_url=False)[:20]:
         names = [str(part) for part in e["loc"] if not _BRANCH.fullmatch(str(part))]
         field = ".".join([*([prefix] if prefix else []), *names]) or "body"
         missing = e["type"] == "missing"
-        found.append(FieldError(field=shorten(field), value="" if missing else shorten(e["input"]), rule=e["msg"]))
+        found.append(
+            FieldError(
+                field=shorten(field), value="" if missing else shorten(e["input"]), rule=id_mistake(e) or e["msg"]
+            )
+        )
     return tuple(found)
+
+
+def id_mistake(error: ErrorDetails) -> str | None:
+    """Return the sentence for a field that is not an id, and None for another mistake: a pattern helps nobody."""
+    if error["type"] == "string_pattern_mismatch" and error.get("ctx", {}).get("pattern") == ID_PATTERN:
+        return not_an_id(str(error["input"]))
+    return None
+
+
+def check_id(name: str, value: str) -> str:
+    """Return ``value``. Raise :class:`MalformedMessage` with the rule and a proposal where it is not an id.
+
+    ``name`` is the field, path part or flag that it stands in.
+    """
+    if not is_id(value):
+        rule = not_an_id(value)
+        raise MalformedMessage(f"{name}: {rule}", (FieldError(field=name, value=shorten(value), rule=rule),))
+    return value
 
 
 def malformed(what: str, error: ValidationError) -> MalformedMessage:

@@ -6,12 +6,9 @@ Every refusal of a name says which names there are and ends with :func:`did_you_
 from __future__ import annotations
 
 import difflib
-import re
-import unicodedata
 from collections.abc import Iterable
 
-_FOREIGN = str.maketrans({"ß": "ss", "æ": "ae", "Æ": "AE", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D"})
-"""Letters that Unicode does not decompose into a Latin letter and an accent."""
+from shift_schemas.ids import propose_id
 
 
 def nearest(given: object, known: Iterable[str]) -> str | None:
@@ -29,12 +26,6 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     return f"; did you mean {near!r}?" if near is not None else ""
 
 
-def id_like(text: str) -> str:
-    """Return an id that resembles ``text``: accents dropped, everything else a hyphen; empty if nothing is left."""
-    plain = unicodedata.normalize("NFKD", text[:200].translate(_FOREIGN)).encode("ascii", "ignore").decode()
-    return re.sub(r"[^A-Za-z0-9_]+", "-", plain).strip("-_")[:63].rstrip("-_")
-
-
 def level_like(text: str) -> str:
     """Return a strategy's level that resembles ``text``: lower case, words joined with ``_``; else empty."""
-    return id_like(text).lower().replace("-", "_").lstrip("0123456789_")[:32]
+    return propose_id(text).lower().replace("-", "_").lstrip("0123456789_")[:32]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from shift_schemas.errors import MalformedMessage, shorten
-from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.ids import is_id, not_an_id
 
 ROOT = "shift/v1"
 
@@ -140,7 +140,7 @@ def parse_key(text: str) -> Key:
 
 def _id(text: str) -> str:
     if not is_id(text):
-        raise MalformedMessage(f"{shorten(text)!r} is no id: {ID_RULE}")
+        raise MalformedMessage(not_an_id(text))
     return text
 
 

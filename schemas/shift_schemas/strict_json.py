@@ -9,14 +9,17 @@ from typing import Any
 from shift_schemas.errors import FieldError, MalformedMessage
 
 
+class NotJson(MalformedMessage):
+    """Text that is not JSON at all; a door may say more about it."""
+
+
 def parse_json(raw: bytes | str) -> Any:
     """What ``raw`` says. Raises :class:`MalformedMessage` with the rule that it breaks."""
     try:
         return json.loads(raw, object_pairs_hook=_once, parse_constant=_no_constant, parse_float=_finite)
     except (ValueError, RecursionError) as e:
-        rule = str(e) if isinstance(e, _Refused) else "the body must be JSON"
-        error = FieldError(field="body", value="", rule=rule)
-        raise MalformedMessage(f"body: {rule}", (error,)) from e
+        kind, rule = (MalformedMessage, str(e)) if isinstance(e, _Refused) else (NotJson, "the body must be JSON")
+        raise kind(f"body: {rule}", (FieldError(field="body", value="", rule=rule),)) from e
 
 
 class _Refused(ValueError):

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, get_args
 
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.hints import did_you_mean, id_like, level_like, nearest
-from shift_schemas.ids import ID_PATTERN, ID_RULE
+from shift_schemas.hints import did_you_mean, level_like, nearest
+from shift_schemas.ids import ID_PATTERN, ID_RULE, propose_id
 from shift_schemas.study_shape import CONDITIONS, Path, annotation_at, default_at, dotted, keys_at, kind_at
 from shift_schemas.study_units import converted, unit_of
 from shift_schemas.yaml_core import core_number
@@ -131,7 +131,7 @@ def _key_rule(path: Path, given: Any) -> str:
 
 
 def _word_rule(pattern: str, given: str) -> str:
-    rule, like = (ID_RULE, id_like) if pattern == ID_PATTERN else (LEVEL_RULE, level_like)
+    rule, like = (ID_RULE, propose_id) if pattern == ID_PATTERN else (LEVEL_RULE, level_like)
     what = "an id" if pattern == ID_PATTERN else "a level or strategy name"
     proposal = f"; write for example {like(given)!r}" if like(given) else ""
     return f"{shorten(given)!r} is not {what}: {rule}{proposal}"

@@ -173,7 +173,7 @@ async def running_mesh(data: Path, patience_s: float = 1.0) -> AsyncIterator[Mes
 
     app = make_app(GatewaySettings(data=data, patience_s=patience_s), open_bus, clock)
     async with AsyncExitStack() as stack:
-        http = httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://mesh", timeout=None)
+        http = httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://127.0.0.1", timeout=None)
         mesh = Mesh(data, hub, clock, app, await stack.enter_async_context(http))
         for name in CORES:
             mesh.start(name)

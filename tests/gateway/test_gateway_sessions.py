@@ -81,9 +81,9 @@ async def test_a_study_object_and_its_condition_are_in_force(mesh: Mesh) -> None
      ({"condition": "x"}, "condition", "control, adaptive"),
      ({"study": {**STUDY, "reward": {"decay": -1}}}, "reward.decay", "it must be at least 0"),
      ({"study": {**STUDY, "rewrad": {}}}, "rewrad", "write 'reward'"), ({"study": {}}, "study", "missing"),
-     ({"study": 7}, "study", "valid"), ({"study": "../x"}, "study", "pattern"), ({"seed": -1}, "seed", "greater"),
+     ({"study": 7}, "study", "valid"), ({"study": "../x"}, "study", "for example x"), ({"seed": -1}, "seed", "greater"),
      ({"seed": 2**53}, "seed", "less than"), ({"seed": 1.5}, "seed", "integer"), ({"seed": True}, "seed", "integer"),
-     ({"participant": "a/b"}, "participant", "pattern"), ({"session": "**"}, "session", "pattern"),
+     ({"participant": "a/b"}, "participant", "for example a-b"), ({"session": "**"}, "session", "'**' is not an id"),
      ({"participant": None}, "participant", "valid string"), ({"color": "red"}, "color", "not permitted")],
     ids=str,
 )  # fmt: skip

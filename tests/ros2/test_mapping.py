@@ -56,7 +56,7 @@ def test_a_sample_is_a_chunk_of_one_that_the_bridge_numbers() -> None:
         ({"t": [1.0, 2.0], "aoi": ["a"]}, "body", "", "as many"),
         ({"t": 1.0}, "body", "", "either aoi"),
         ({"t": 1.0, "aoi": "a", "session": 5}, "session", "5", "string"),
-        ({"t": 1.0, "aoi": "a", "source": "../a"}, "source", "../a", "pattern"),
+        ({"t": 1.0, "aoi": "a", "source": "../a"}, "source", "../a", "for example a"),
         ({"t": 1.0, "aoi": "a", "extra": 1}, "extra", "1", "not permitted"),
         ({"t": 1.0, "aoi": "a", "seq": -1}, "seq", "-1", "greater"),
         ({"t": 1.0, "aoi": "\ud800"}, "data", "", "surrogate"),

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
-from shift_schemas.ids import ID_PATTERN, Id, is_id
+from shift_schemas.errors import MalformedMessage, check_id, malformed
+from shift_schemas.ids import ID_PATTERN, Id, is_id, not_an_id, propose_id
 from strategies import HOSTILE_IDS, ids
 
 _FIELD = TypeAdapter(Id)
@@ -51,3 +52,40 @@ def test_only_text_is_an_id(value: object) -> None:
 def test_the_schema_that_others_read_has_the_contract_s_pattern() -> None:
     assert ID_PATTERN == "^[A-Za-z0-9][A-Za-z0-9_-]{0,62}$"
     assert _FIELD.json_schema() == {"type": "string", "pattern": ID_PATTERN}
+
+
+# --- the sentence and the proposal ---
+
+
+@pytest.mark.parametrize(
+    ("text", "proposed"),
+    [("P 01", "P-01"), ("Müller", "Mueller"), ("P01 ", "P01"), ("P.01", "P-01"), ("a/b", "a-b"), ("_p1", "p1"),
+     ("-P1", "P1"), ("Ｐ０１", "P01"), ("١٢", "12"), ("", "P01"), ("**", "P01"), ("grasp\u200b", "grasp"),
+     ("anna@example.org", "anna-example-org"), ("2024-11-25T10:00", "2024-11-25T10-00"), ("Ünïcødé", "Uenicoede"),
+     ("U\u0308bung", "Uebung"), ("tasse - füllen", "tasse-fuellen"), ("P" * 64, "P" * 63), ("P01\n", "P01")],
+)  # fmt: skip
+def test_the_proposal_reads_like_what_was_written(text: str, proposed: str) -> None:
+    assert propose_id(text) == proposed
+
+
+@given(st.text(max_size=200))
+def test_whatever_is_proposed_is_an_id(text: str) -> None:
+    assert is_id(propose_id(text))
+    assert propose_id(propose_id(text)) == propose_id(text)
+
+
+def test_a_path_and_a_field_are_refused_with_the_same_sentence() -> None:
+    sentence = (
+        "'P 01' is not an id: 1 to 63 letters, digits, - and _, beginning with a letter or digit; for example P-01"
+    )
+    with pytest.raises(MalformedMessage) as path:
+        check_id("participant", "P 01")
+    with pytest.raises(ValidationError) as field:
+        _FIELD.validate_python("P 01")
+    assert path.value.detail == f"participant: {sentence}"
+    assert [e.rule for e in (*path.value.errors, *malformed("body", field.value).errors)] == [sentence] * 2
+    assert check_id("participant", "P-01") == "P-01"
+
+
+def test_a_long_text_is_said_back_cut() -> None:
+    assert len(not_an_id("ä" * 60_000)) < 250

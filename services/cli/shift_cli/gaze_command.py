@@ -48,11 +48,12 @@ def play(
     shift-mesh gaze play trial1.tsv.gz --session s1 --speed 20
     """
     from shift_runtime.rest_client import RestClient
-    from shift_schemas.errors import MalformedMessage
+    from shift_schemas.errors import MalformedMessage, check_id
 
     from shift_cli.gaze_files import samples
 
-    _check_source(source)
+    if source is not None:
+        check_id("--source", source)
     found = list(samples(file))
     if not found:
         raise MalformedMessage(f"{file.name} holds no samples")
@@ -128,16 +129,6 @@ def _nothing_counted(said: Described, before: dict[str, Any], after: dict[str, A
     if after["samples"] == before["samples"]:
         return "the session had all of it already, under this source; give another --source to play it once more"
     return "no fixation of it fell on an AOI; check the study's AOIs, the rate and the share that is lost"
-
-
-def _check_source(source: str | None) -> None:
-    from shift_schemas.errors import InvalidSettings, shorten
-    from shift_schemas.hints import id_like
-    from shift_schemas.ids import ID_RULE, is_id
-
-    if source is not None and not is_id(source):
-        proposal = f"; for example {id_like(source)}" if id_like(source) else ""
-        raise InvalidSettings(f"--source: {shorten(source)!r} is not an id: {ID_RULE}{proposal}")
 
 
 def _source_of(file: Path) -> str:

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from fastapi import FastAPI, Query, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, StreamingResponse
@@ -16,22 +16,24 @@ from shift_runtime.clock import Clock
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
 from shift_schemas.codec import encode
-from shift_schemas.errors import ShiftError, UnknownThing
+from shift_schemas.errors import ShiftError, UnknownThing, check_id
 from shift_schemas.keys import OWNERS, ServiceKey, build_key
 from shift_schemas.messages import Fact, GazeChunk, Health
-from starlette.exceptions import HTTPException
 
 from shift_gateway import bodies
+from shift_gateway.docs_page import add_docs
 from shift_gateway.door import Door
 from shift_gateway.gathering import gathered
-from shift_gateway.page import PAGE
+from shift_gateway.origins import Rules
+from shift_gateway.page import PAGE, PAGE_POLICY
+from shift_gateway.paths import GatewayApp
 from shift_gateway.problems import (
     PROBLEM_RESPONSE,
     BodyLimit,
     body,
-    check_id,
     check_size,
     message,
+    only,
     problem_body,
     problem_response,
 )
@@ -109,7 +111,8 @@ def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastA
         async with gateway.on(await open_bus(), clock):
             yield
 
-    app = FastAPI(
+    app = GatewayApp(
+        Rules(settings.host, settings.hosts, settings.origins),
         title="SHIFT mesh",
         summary="How should the robot phrase its next explanation for this person, now?",
         version="v1",
@@ -119,28 +122,19 @@ def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastA
     )
     app.add_middleware(BodyLimit)
     app.add_exception_handler(ShiftError, _on_shift_error)
-    app.add_exception_handler(HTTPException, _on_http_error)
     _add_sessions(app, gateway)
     _add_interaction(app, gateway)
     _add_reads(app, gateway)
     _add_recordings(app, gateway)
     add_studies(app, settings.data / "studies")
     _add_operations(app, gateway)
+    add_docs(app)
     return app
 
 
 async def _on_shift_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, ShiftError)
     return problem_response(error)
-
-
-async def _on_http_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    content = {"type": "about:blank", "title": str(error.detail), "status": error.status_code}
-    content["detail"] = f"{request.method} {request.url.path[:200]}: {error.detail}"
-    return JSONResponse(
-        {**content, "errors": []}, error.status_code, headers=error.headers, media_type="application/problem+json"
-    )
 
 
 def _documented(kind: type[BaseModel]) -> dict[str, Any]:
@@ -301,14 +295,16 @@ def _add_reads(app: FastAPI, gateway: Gateway) -> None:
         return await gateway.door.policy(check_id("session", session))
 
     @app.get("/v1/sessions/{session}/strategy", tags=["reading"])
-    async def preview(session: str, task: str = Query(default="", description="The task.")) -> dict[str, Any]:
+    async def preview(
+        session: str,
+        task: Annotated[list[str], Query(description="The task.")] = [],  # noqa: B006 - FastAPI copies it
+    ) -> dict[str, Any]:
         """What a decision made now would carry; no side effect."""
         check_id("session", session)
-        check_id("task", task)
-        return await gateway.door.preview(session, task)
+        return await gateway.door.preview(session, check_id("task", only("task", task)))
 
     @app.get("/v1/sessions/{session}/events", tags=["reading"], response_class=StreamingResponse)
-    async def events(session: str) -> Response:
+    async def events(session: str, request: Request) -> Response:
         """Server-sent events: event = subject, data = the message."""
         view = await gateway.replica.view(check_id("session", session))
         waiting: asyncio.Queue[str | None] = asyncio.Queue(EVENTS_WAITING)
@@ -339,7 +335,8 @@ def _add_reads(app: FastAPI, gateway: Gateway) -> None:
                 if listen in view.listeners:
                     view.listeners.remove(listen)
 
-        return StreamingResponse(stream(), media_type="text/event-stream", headers={"Cache-Control": "no-cache"})
+        given: dict[str, Any] = {"media_type": "text/event-stream", "headers": {"Cache-Control": "no-cache"}}
+        return Response(**given) if request.method == "HEAD" else StreamingResponse(stream(), **given)
 
 
 def _add_recordings(app: FastAPI, gateway: Gateway) -> None:
@@ -381,4 +378,4 @@ def _add_operations(app: FastAPI, gateway: Gateway) -> None:
 
     @app.get("/", include_in_schema=False)
     async def page() -> HTMLResponse:
-        return HTMLResponse(PAGE)
+        return HTMLResponse(PAGE, headers={"Content-Security-Policy": PAGE_POLICY})

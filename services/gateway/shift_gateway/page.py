@@ -1,9 +1,14 @@
 """The page at ``/``: what runs, and how to start. It asks ``/readyz`` and ``/v1/sessions``; no library."""
 
+from __future__ import annotations
+
+import base64
+import hashlib
+
 PAGE = """<!doctype html>
 <html lang="en">
 <meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<title>SHIFT mesh</title>
+<title>SHIFT mesh</title><link rel="icon" href="/favicon.ico">
 <style>
  body{font:16px/1.5 system-ui,sans-serif;max-width:46rem;margin:2rem auto;padding:0 1rem;
   color:#1b2733;background:#fff}
@@ -50,3 +55,16 @@ refresh();
 </script>
 </html>
 """
+
+
+def _policy(page: str) -> str:
+    """The content security policy of a page: its one script by its hash, and nothing of another host."""
+    script = page.split("<script>")[1].split("</script>")[0]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return (
+        f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; img-src 'self'; "
+        "connect-src 'self'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
+PAGE_POLICY = _policy(PAGE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from http import HTTPStatus
 from typing import Any, TypeVar
 
@@ -9,9 +10,10 @@ from fastapi import Request
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ValidationError
 from shift_schemas.errors import FieldError, MalformedMessage, Problem, ShiftError, TooLarge, malformed, shorten
-from shift_schemas.ids import ID_RULE, is_id
-from shift_schemas.strict_json import parse_json
+from shift_schemas.strict_json import NotJson, parse_json
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from shift_gateway.request_bodies import check_encoding, not_an_object, not_json, without_mark
 
 BODY_LIMIT = 256 * 1024
 M = TypeVar("M", bound=BaseModel)
@@ -57,12 +59,14 @@ def problem_response(error: ShiftError) -> JSONResponse:
     return JSONResponse(problem_body(error), error.status, headers=headers, media_type=MEDIA_TYPE)
 
 
-def check_id(name: str, value: str) -> str:
-    """``value``, or :class:`MalformedMessage` that says what an id is."""
-    if not is_id(value):
-        error = FieldError(field=name, value=shorten(value), rule=ID_RULE)
-        raise MalformedMessage(f"{name}: {ID_RULE}", (error,))
-    return value
+def only(name: str, values: list[str]) -> str:
+    """Return the one value of a query parameter. Raise :class:`MalformedMessage` where it is missing or repeated."""
+    if len(values) == 1:
+        return values[0]
+    rule = f"it is given {len(values)} times; give it once"
+    if not values:
+        rule = f"it is missing; write it into the address, as in ...?{name}=grasp, since the body of a GET is not read"
+    raise MalformedMessage(f"{name}: {rule}", (FieldError(field=name, value=shorten(", ".join(values)), rule=rule),))
 
 
 def check_size(size: int) -> None:
@@ -73,12 +77,19 @@ def check_size(size: int) -> None:
 
 async def body(request: Request, kind: type[M]) -> M:
     """The body as a message. Raises :class:`MalformedMessage` that names field, value and rule."""
-    return message(await request.body(), kind)
+    check_encoding(request.headers.get("content-encoding", ""))
+    return message(await request.body(), kind, request.query_params.multi_items())
 
 
-def message(raw: bytes | str, kind: type[M]) -> M:
-    """``raw`` as a message. Raises :class:`MalformedMessage`."""
-    parse_json(raw)
+def message(raw: bytes | str, kind: type[M], query: Iterable[tuple[str, str]] = ()) -> M:
+    """``raw`` as a message. Raises :class:`MalformedMessage`. ``query`` helps to explain an empty body."""
+    raw = without_mark(raw)
+    try:
+        data = parse_json(raw if isinstance(raw, str) else raw.decode())
+    except (NotJson, UnicodeDecodeError) as e:
+        raise not_json(raw, query) from e
+    if not isinstance(data, dict):
+        raise not_an_object(data)
     try:
         return kind.model_validate_json(raw)
     except ValidationError as e:

@@ -16,6 +16,7 @@ from shift_runtime.zenoh_bus import ZenohBus
 from shift_schemas.errors import ShiftError
 
 from shift_gateway.app import make_app
+from shift_gateway.http_protocol import GatewayProtocol
 from shift_gateway.settings import GatewaySettings
 
 log = structlog.get_logger()
@@ -42,7 +43,7 @@ def run_gateway() -> None:
         signal.signal(number, lambda *_: None)
     uvicorn.run(
         app, host=settings.host, port=settings.port, log_level="warning", access_log=False,
-        timeout_graceful_shutdown=GRACE_S, ws_max_size=256 * 1024, server_header=False,
+        timeout_graceful_shutdown=GRACE_S, ws_max_size=256 * 1024, server_header=False, http=GatewayProtocol,
     )  # fmt: skip
     log.info("stopped")
     leave()

@@ -18,7 +18,7 @@ from shift_runtime.bus import Bus
 from shift_runtime.reader import REPLAY_MARK
 from shift_schemas.codec import decode, encode, encoding_of
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, shorten
-from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.ids import is_id, not_an_id
 from shift_schemas.keys import SUBJECTS, FactKey, ServiceKey, build_key
 from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, Session
 from shift_schemas.stamps import NS
@@ -61,7 +61,7 @@ class Replay:
     def __post_init__(self) -> None:
         """Check it."""
         if not is_id(self.session):
-            raise MalformedMessage(f"{shorten(self.session)!r} is no id: {ID_RULE}")
+            raise MalformedMessage(not_an_id(self.session))
         if not 0 < self.rate <= 10_000:
             raise MalformedMessage(f"a speed of {self.rate:g} is not valid; write a number above 0, 1 for real time")
         if not 0 <= self.start_offset_s < 1e9:

@@ -11,8 +11,8 @@ import contextlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from shift_schemas.errors import MalformedMessage, shorten
-from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.errors import MalformedMessage
+from shift_schemas.ids import is_id, not_an_id
 
 from shift_recorder.storage import DurableFile, StorageFailed, make_folder, sync_folder
 from shift_recorder.writing import SESSION_METADATA, RecordingWriter
@@ -101,7 +101,7 @@ class SegmentWriter:
 
 def _session_folder(folder: Path, session: str) -> Path:
     if not is_id(session):
-        raise MalformedMessage(f"{shorten(session)!r} is no id: {ID_RULE}")
+        raise MalformedMessage(not_an_id(session))
     return folder / session
 
 

@@ -12,7 +12,16 @@ from typing import Any, NamedTuple, TypeVar
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from pydantic_core import to_json
 from shift_schemas.bodies import PerformanceBody
-from shift_schemas.errors import FieldError, MalformedMessage, Problem, ShiftError, TooLarge, malformed, shorten
+from shift_schemas.errors import (
+    FieldError,
+    MalformedMessage,
+    Problem,
+    ShiftError,
+    TooLarge,
+    id_mistake,
+    malformed,
+    shorten,
+)
 from shift_schemas.ids import Id
 from shift_schemas.messages import Fact, GazeChunk, Message, Observation
 from shift_schemas.strict_json import parse_json
@@ -141,7 +150,7 @@ def _checked_id(field: str, value: Any) -> None:
     try:
         _ID.validate_python(value, strict=True)
     except ValidationError as e:
-        raise _refused("gaze", field, value, e.errors()[0]["msg"]) from e
+        raise _refused("gaze", field, value, id_mistake(e.errors()[0]) or e.errors()[0]["msg"]) from e
 
 
 def _refused(what: str, field: str, value: Any, rule: str) -> MalformedMessage:

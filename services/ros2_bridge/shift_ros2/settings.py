@@ -10,7 +10,7 @@ from typing import Any, Literal
 from pydantic import Field
 from shift_runtime.settings import MeshSettings, read_settings
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.ids import ID_RULE, Id, is_id
+from shift_schemas.ids import Id, is_id, not_an_id
 
 from shift_ros2.arguments import Parameters, RosArguments, parameters_of, parse_ros_args
 from shift_ros2.interfaces import INTERFACES
@@ -61,7 +61,8 @@ class BridgeSettings(MeshSettings):
             return self.session
         named = self.namespace.rpartition("/")[2] or DEFAULT_SESSION
         if not is_id(named):
-            raise InvalidSettings(f"namespace {self.namespace} names no session ({ID_RULE}); set parameter session")
+            rule = f"{not_an_id(named)}; set parameter session"
+            raise InvalidSettings(f"namespace {self.namespace} names no session: {rule}")
         return named
 
     @property

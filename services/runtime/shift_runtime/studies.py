@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.hints import did_you_mean, id_like
-from shift_schemas.ids import ID_RULE, is_id
+from shift_schemas.hints import did_you_mean
+from shift_schemas.ids import ID_RULE, is_id, propose_id
 from shift_schemas.study import Study
 from shift_schemas.study_checks import study_warnings
 from shift_schemas.study_text import given_study, parse_study, study_data
@@ -154,7 +154,7 @@ def _one_of(name: str, paths: list[tuple[Traversable, str]]) -> CheckedStudy:
 
 def _check_name(stem: str, file: str) -> None:
     if not is_id(stem):
-        like = f"; rename it to {id_like(stem)}.yaml" if id_like(stem) else ""
+        like = f"; rename it to {propose_id(stem)}.yaml"
         rule = f"sessions are started by the file's name, and {stem!r} is not an id: {ID_RULE}{like}"
         raise InvalidStudy(f"{file}: {rule}", (FieldError(field="study", value=shorten(stem), rule=rule),))
 
