@@ -17,7 +17,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import structlog
 from shift_schemas.codec import decode, encode, encode_answer, encoding_of
-from shift_schemas.errors import Conflict, MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
+from shift_schemas.errors import MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
 from shift_schemas.keys import (
     PROCEDURES,
     ROOT,
@@ -40,12 +40,13 @@ from shift_schemas.messages import (
     OutboxRow,
     Session,
 )
+from shift_schemas.repeats import repeat_conflict
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import NotYet, Step
 
 from shift_runtime.bus import Bus, Incoming, Request
 from shift_runtime.clock import Clock
-from shift_runtime.journal import AnswerKey, Batch, Journal, StoredAnswer, digest_of
+from shift_runtime.journal import AnswerKey, Batch, Journal, StoredAnswer, same_content
 from shift_runtime.metrics import Metrics
 from shift_runtime.reader import Reader, ReadFact
 
@@ -386,8 +387,8 @@ class Worker(Generic[S]):
         stored = turn.batch.answers.get(asked.key) or self.journal.answer(asked.key)
         if stored is None:
             return None
-        if stored.digest != digest_of(asked.message.content()):
-            raise Conflict(f"{asked.procedure} {asked.message.command_id} was asked before with another content")
+        if not same_content(stored.content, asked.message.content()):
+            raise repeat_conflict(asked.message, stored.content)
         return stored.result
 
     def _keep(self, turn: _Turn, asked: Asked, step: Step[S]) -> None:
@@ -397,7 +398,7 @@ class Worker(Generic[S]):
         else:
             result, seq = json.dumps(step.result), 0
         if asked.key is not None and isinstance(asked.message, Command):
-            turn.batch.answers[asked.key] = StoredAnswer(digest_of(asked.message.content()), result, seq)
+            turn.batch.answers[asked.key] = StoredAnswer(asked.message.content(), result, seq)
         turn.answers.append((asked, _Told(result, self._head(turn, asked.session))))
 
     def _refuse(self, turn: _Turn, asked: Asked, error: ShiftError) -> None:
