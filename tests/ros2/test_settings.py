@@ -39,7 +39,7 @@ def test_a_line_as_ros_nodes_take_it() -> None:
     assert settings.names["decision"] == "/lab/shift/decision"
     assert (settings.backend, settings.create_session, settings.seed, settings.depth) == ("rclpy", True, 7, 3)
     assert settings.bound_session == "lab", "the namespace binds to a session"
-    assert settings.log_level == "warn"
+    assert settings.log_level == "warning"
 
 
 def test_a_parameter_binds_to_a_session_whatever_the_namespace_is() -> None:

@@ -11,7 +11,9 @@ import sys
 import threading
 
 import zenoh
+from shift_schemas.errors import InvalidSettings
 
+from shift_runtime.endpoints import parse_endpoint
 from shift_runtime.settings import DEFAULT_ROUTER
 from shift_runtime.zenoh_config import zenoh_config
 
@@ -22,6 +24,11 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     listen = os.environ.get("SHIFT_ROUTER_LISTEN", DEFAULT_ROUTER)
+    try:
+        parse_endpoint(listen, "SHIFT_ROUTER_LISTEN")
+    except InvalidSettings as e:
+        sys.stderr.write(f"shift_router: {e.detail}\n")
+        sys.exit(2)
     try:
         session = zenoh.open(zenoh_config("router", listen=listen))
     except zenoh.ZError as e:

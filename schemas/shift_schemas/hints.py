@@ -1,0 +1,40 @@
+"""What was probably meant: the nearest known name, and an id made of any text. Pure.
+
+Every refusal of a name says which names there are and ends with :func:`did_you_mean`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import unicodedata
+from collections.abc import Iterable
+
+_FOREIGN = str.maketrans({"ß": "ss", "æ": "ae", "Æ": "AE", "ø": "o", "Ø": "O", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D"})
+"""Letters that Unicode does not decompose into a Latin letter and an accent."""
+
+
+def nearest(given: object, known: Iterable[str]) -> str | None:
+    """Return the name that ``given`` most resembles, upper and lower case alike; ``None`` if it resembles none."""
+    by_case: dict[str, str] = {}
+    for name in known:
+        by_case.setdefault(name.casefold(), name)
+    found = difflib.get_close_matches(str(given)[:200].casefold(), list(by_case), n=1)
+    return by_case[found[0]] if found else None
+
+
+def did_you_mean(given: object, known: Iterable[str]) -> str:
+    """Return ``"; did you mean 'grasp'?"``, or an empty string if no known name resembles ``given``."""
+    near = nearest(given, known)
+    return f"; did you mean {near!r}?" if near is not None else ""
+
+
+def id_like(text: str) -> str:
+    """Return an id that resembles ``text``: accents dropped, everything else a hyphen; empty if nothing is left."""
+    plain = unicodedata.normalize("NFKD", text[:200].translate(_FOREIGN)).encode("ascii", "ignore").decode()
+    return re.sub(r"[^A-Za-z0-9_]+", "-", plain).strip("-_")[:63].rstrip("-_")
+
+
+def level_like(text: str) -> str:
+    """Return a strategy's level that resembles ``text``: lower case, words joined with ``_``; else empty."""
+    return id_like(text).lower().replace("-", "_").lstrip("0123456789_")[:32]
