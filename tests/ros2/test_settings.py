@@ -78,8 +78,8 @@ def test_the_sample_parameter_file_is_valid() -> None:
     ("line", "word"),
     [
         ("--sesion s1", "--sesion"),
-        ("--session", "needs a value"),
-        ("--ros-args -p sesion:=s1", "no parameter"),
+        ("--session", "has no value"),
+        ("--ros-args -p sesion:=s1", "not a parameter"),
         ("--ros-args -p session:=a/b", "SESSION"),
         ("--ros-args -p session:=**", "SESSION"),
         ("--ros-args -p depth:=many", "DEPTH"),
@@ -94,7 +94,7 @@ def test_the_sample_parameter_file_is_valid() -> None:
         ("--backend dds", "BACKEND"),
     ],
 )
-def test_what_does_not_do_is_said(line: str, word: str) -> None:
+def test_what_is_not_valid_is_said(line: str, word: str) -> None:
     with pytest.raises(InvalidSettings) as caught:
         bridge_settings(line.split())
     assert word in caught.value.detail

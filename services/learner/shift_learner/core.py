@@ -209,7 +209,7 @@ def _check_known(state: LearnerState, command: ReportPerformance, late: bool) ->
     if behind and not late:
         raise NotYet(behind, WAIT_S)
     if state.config is None or state.decisions < command.need.decision:
-        raise Unavailable(f"the learner has not heard all of the {' and the '.join(behind)} yet")
+        raise Unavailable(f"the learner has not read everything of the {' and the '.join(behind)} yet; send it again")
     if command.command_id not in state.open:
         raise UnknownThing(f"session {state.session} has no decision {command.command_id} that waits for a result")
 
@@ -274,7 +274,7 @@ def _seen(state: LearnerState) -> Seen:
 
 def _context(state: LearnerState) -> Context:
     if state.config is None:
-        raise Unavailable("the recorder has put out no configuration of this session yet")
+        raise Unavailable("the recorder has not published a configuration of this session yet; ask again")
     return context_of(state.config.study)
 
 

@@ -32,7 +32,8 @@ def main() -> None:
     try:
         session = zenoh.open(zenoh_config("router", listen=listen))
     except zenoh.ZError as e:
-        sys.exit(f"the router cannot listen on {listen}: {e}; is another one running? set SHIFT_ROUTER_LISTEN")
+        todo = "if another router runs there, stop it, or set SHIFT_ROUTER_LISTEN to another endpoint"
+        sys.exit(f"the router cannot listen on {listen}: {e}; {todo}")
     print(f"router listens on {listen}", file=sys.stderr, flush=True)
     while not stop.wait(0.5):
         pass

@@ -253,7 +253,7 @@ class Worker(Generic[S]):
         try:
             key = parse_key(request.key)
             if not isinstance(key, CommandKey):
-                raise MalformedMessage(f"{request.key} is no command's key")
+                raise MalformedMessage(f"{request.key} is not the key of a command")
             command = decode(COMMANDS[key.procedure], request.payload)
             if command.session != key.session:
                 raise MalformedMessage(f"a command for session {command.session} under session {key.session}")
@@ -281,7 +281,7 @@ class Worker(Generic[S]):
     def _chunk(self, text: str, payload: bytes) -> tuple[str, GazeChunk]:
         key = parse_key(text)
         if not isinstance(key, StreamKey):
-            raise MalformedMessage(f"{text} is no stream's key")
+            raise MalformedMessage(f"{text} is not the key of a stream")
         return key.session, decode(GazeChunk, payload)
 
     def _drop(self, request: Request, error: MalformedMessage) -> None:
@@ -376,7 +376,8 @@ class Worker(Generic[S]):
             self._refuse(turn, asked, e)
         except Exception as e:  # a mistake of ours: it must not end the service for everybody else
             log.exception("a command failed", procedure=asked.procedure, session=asked.session)
-            self._refuse(turn, asked, ShiftError(f"the {self.core.name} failed at it: {type(e).__name__}; see its log"))
+            why = f"because of a mistake of its own ({type(e).__name__}); see its log"
+            self._refuse(turn, asked, ShiftError(f"the {self.core.name} could not do this {why}"))
         else:
             self._take(turn, asked.session, step)
             self._keep(turn, asked, step)

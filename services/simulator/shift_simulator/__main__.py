@@ -45,7 +45,7 @@ def main() -> None:
         if settings.demo:
             _live(settings, stop)
         else:
-            log.info("no simulated person is wanted")
+            log.info("the simulated person is switched off by SHIFT_DEMO")
             stop.wait()
     except ShiftError as e:
         sys.stderr.write(f"shift_simulator: {e.detail}\n")
@@ -61,7 +61,7 @@ def _live(settings: DemoSettings, stop: threading.Event) -> None:
                 if shift.start("P00", session=session, study="default")["state"] != "live":
                     number += 1
                     continue
-                log.info("a simulated person is here", session=session, user=settings.demo_user)
+                log.info("the simulated person begins", session=session, user=settings.demo_user)
                 for _ in drive(shift, session, paper_user(settings.demo_user), 1_000_000):
                     if stop.wait(settings.demo_every_s):
                         return

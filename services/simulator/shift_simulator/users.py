@@ -148,7 +148,7 @@ def _said(error: ValidationError) -> str:
 
 
 def _no_constant(text: str) -> Any:
-    raise ValueError(f"{text} is not a number that JSON knows")
+    raise ValueError(f"{text} is not a number in JSON; write a number")
 
 
 def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
