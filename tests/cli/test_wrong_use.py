@@ -259,9 +259,7 @@ def test_a_session_that_is_not_an_id_is_refused_by_its_field(
                           {"field": "seed", "value": "x", "rule": "write a number"}]}  # fmt: skip
     stranger.answer = (422, "application/problem+json", json.dumps(problem).encode())  # type: ignore[attr-defined]
     said = wrong(capfd, "simulate", "--session", "P 01", "--url", url_of(stranger))
-    assert "session: not an id" in said
-    assert "session: write P-01" in said
-    assert "seed: write a number" in said
+    assert said.endswith("shift-mesh: session: not an id\n  seed: write a number\n")
 
 
 def test_ctrl_c_ends_a_command_without_a_traceback(stranger: ThreadingHTTPServer) -> None:
@@ -292,7 +290,7 @@ def failing(error: BaseException) -> typer.Typer:
     [
         (OSError(28, "No space left on device", "/data/x"), 2, "shift-mesh: /data/x: No space left on device\n"),
         (
-            MalformedMessage("this is wrong", (FieldError(field="a", value="", rule="b"),)),
+            MalformedMessage("this is wrong", (FieldError(field="this", value="", rule="b"),)),
             2,
             "shift-mesh: this is wrong\n",
         ),

@@ -74,8 +74,8 @@ def _flag(option: Any) -> str:
 
 
 def _said(error: ShiftError) -> int:
-    """Say the detail, and the fields that it does not name where there are several."""
-    further = [f"  {f.field}: {f.rule}" for f in error.errors] if len(error.errors) > 1 else []
+    """Say the detail, and each wrong field that it does not name."""
+    further = [f"  {f.field}: {f.rule}" for f in error.errors if f.field not in error.detail]
     return _sentence("\n".join([error.detail, *further]))
 
 

@@ -209,7 +209,7 @@ def _check_known(state: LearnerState, command: ReportPerformance, late: bool) ->
     if behind and not late:
         raise NotYet(behind, WAIT_S)
     if state.config is None or state.decisions < command.need.decision:
-        raise Unavailable(f"the learner has not read everything of the {' and the '.join(behind)} yet; send it again")
+        raise Unavailable(f"the learner has not heard all of the {' and the '.join(behind)} yet")
     if command.command_id not in state.open:
         raise UnknownThing(f"session {state.session} has no decision {command.command_id} that waits for a result")
 
