@@ -18,6 +18,7 @@ from typer.main import get_command
 
 WRONG = 2
 INTERRUPTED = 130
+"""After Ctrl-C, as shells count it: 128 and the signal's number."""
 WITHOUT_VARIABLE = {"--help", "--version"}
 
 

@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from shift_simulator.options import LEARNER_HELP, USER_HELP, USER_METAVAR, check_learner
 
+from shift_cli.entry import INTERRUPTED
+
 if TYPE_CHECKING:
     from shift_runtime.rest_client import RestClient
     from shift_simulator.live import LiveEpisode
     from shift_simulator.users import User
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells count it: 128 and the signal's number."""
 
 
 def simulate(
