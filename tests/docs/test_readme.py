@@ -3,15 +3,78 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
-from mesh import running_mesh
+from mesh import LiveMesh, running_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 TOUR = re.compile(r"<!-- tour -->\n```sh\n(.*?)```", re.DOTALL)
+BLOCK = re.compile(r"(?:<!-- (.*?) -->\n)?```(\w+)\n(.*?)```", re.DOTALL)
+
+
+def blocks(mark: str, language: str) -> list[str]:
+    """The README's blocks in a language that have this comment before them."""
+    found = BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
+    return [text for marked, kind, text in found if (marked, kind) == (mark, language)]
+
+
+def in_a_fresh_clone(folder: Path, mesh: LiveMesh) -> dict[str, str]:
+    """Make ``folder`` look like a clone in which ``make up`` runs; the environment that leads to this test's mesh."""
+    for name in ("docs", "tests"):
+        (folder / name).symlink_to(ROOT / name)
+    return {
+        **os.environ, "SHIFT_URL": mesh.url, "SHIFT_ZENOH": mesh.zenoh, "SHIFT_ROS_ROUTER": mesh.zenoh,
+        "COLUMNS": "120",
+    }  # fmt: skip
+
+
+def as_here(text: str, mesh: LiveMesh) -> str:
+    text = text.replace("http://127.0.0.1:8080", mesh.url)
+    return text.replace(".venv/bin/shift-mesh", f"{sys.executable} -m shift_cli.main")
+
+
+def test_every_other_line_works_as_printed(tmp_path: Path) -> None:
+    make, *lines = blocks("", "sh")
+    programs, (study,), ros = blocks("", "python"), blocks("", "yaml"), blocks("until Ctrl-C", "sh")
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for line in make.splitlines():
+        assert re.search(rf"^{line.split()[1]}:", makefile, re.MULTILINE), line
+    with running_mesh(tmp_path) as mesh:
+        env = in_a_fresh_clone(tmp_path, mesh)
+        (mesh.data / "studies" / "coffee.yaml").write_text(study, encoding="utf-8")
+        run = partial(subprocess.run, cwd=tmp_path, env=env, capture_output=True, text=True, timeout=240, check=False)
+        for line in (line for block in lines for line in block.splitlines()):
+            done = run(["bash", "-euc", as_here(line, mesh)])
+            assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+        for program in programs * 2:
+            done = run([sys.executable, "-c", as_here(program, mesh)])
+            assert done.returncode == 0, done.stderr
+            assert "because" in done.stdout
+        for line in ros:
+            until_ctrl_c(as_here(line, mesh), env, tmp_path)
+    assert len(lines) >= 2
+    assert len(programs) == len(ros) == 1
+
+
+def until_ctrl_c(line: str, env: dict[str, str], folder: Path) -> None:
+    process = subprocess.Popen(["bash", "-euc", f"exec {line}"], cwd=folder, env=env, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    assert any(" session begun " in line for line in process.stderr), "it ended before"
+    process.send_signal(signal.SIGINT)
+    said = process.stderr.read()
+    assert process.wait(60) == 0, said
+    assert "Traceback" not in said
+
+
+def test_the_example_of_a_user_file_has_a_place_for_everything_that_is_often_changed() -> None:
+    example = json.loads((ROOT / "docs" / "examples" / "my-user.json").read_text(encoding="utf-8"))
+    assert set(example) == {"user", "success", "gaze", "tasks", "capacity"}
 
 
 def test_the_tour_works_as_printed(tmp_path: Path) -> None:

@@ -164,13 +164,16 @@ def test_an_address_that_is_not_ours_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [("SHIFT_PATIENCE_S", "soon"), ("SHIFT_LISTEN", "nonsense"), ("SHIFT_LOG_JSON", "perhaps")],
+    ("name", "value", "starts"),
+    [("SHIFT_PATIENCE_S", "soon", True), ("SHIFT_LISTEN", "nonsense", False), ("SHIFT_LOG_JSON", "perhaps", False)],
 )
-def test_a_service_s_setting_with_a_mistake_stops_the_mesh_and_is_named(tmp_path: Path, name: str, value: str) -> None:
+def test_a_setting_with_a_mistake_is_named_once_and_stops_the_mesh(
+    tmp_path: Path, name: str, value: str, starts: bool
+) -> None:
+    """What every service reads is looked at before anything starts, a service's own by the service."""
     said = refused(tmp_path, **{name: value})
-    assert f"{name} is '{value}'" in said
-    assert "cannot run with these settings; stopping" in said
+    assert said.count(f"{name} is '{value}'") == 1
+    assert ("cannot run with these settings; stopping" in said) == starts
 
 
 def test_a_flag_with_a_mistake_is_named(tmp_path: Path) -> None:

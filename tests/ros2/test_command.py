@@ -1,4 +1,4 @@
-"""``shift-mesh ros2``: what does not do is said in a sentence, with exit code 2."""
+"""``shift-mesh ros2``: wrong use is said in a sentence, with exit code 2."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--ros-args", "-p", "sesion:=s1"], "'sesion' is no parameter of the bridge"),
+        (["--ros-args", "-p", "sesion:=s1"], "'sesion' is not a parameter of the bridge"),
         (["--ros-args", "-r", "shift/gaze:=/a/**"], "name '/a/**'"),
         (["--session", "../s1"], "SHIFT_SESSION"),
         (["--backend", "rclpy"], "needs ROS 2"),

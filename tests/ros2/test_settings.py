@@ -39,7 +39,7 @@ def test_a_line_as_ros_nodes_take_it() -> None:
     assert settings.names["decision"] == "/lab/shift/decision"
     assert (settings.backend, settings.create_session, settings.seed, settings.depth) == ("rclpy", True, 7, 3)
     assert settings.bound_session == "lab", "the namespace binds to a session"
-    assert settings.log_level == "warn"
+    assert settings.log_level == "warning"
 
 
 def test_a_parameter_binds_to_a_session_whatever_the_namespace_is() -> None:
@@ -94,8 +94,8 @@ def test_the_sample_parameter_file_is_valid() -> None:
     ("line", "word"),
     [
         ("--sesion s1", "--sesion"),
-        ("--session", "needs a value"),
-        ("--ros-args -p sesion:=s1", "no parameter"),
+        ("--session", "has no value"),
+        ("--ros-args -p sesion:=s1", "not a parameter"),
         ("--ros-args -p session:=a/b", "SESSION"),
         ("--ros-args -p session:=**", "SESSION"),
         ("--ros-args -p depth:=many", "DEPTH"),
@@ -110,7 +110,7 @@ def test_the_sample_parameter_file_is_valid() -> None:
         ("--backend dds", "BACKEND"),
     ],
 )
-def test_what_does_not_do_is_said(line: str, word: str) -> None:
+def test_what_is_not_valid_is_said(line: str, word: str) -> None:
     with pytest.raises(InvalidSettings) as caught:
         bridge_settings(line.split())
     assert word in caught.value.detail

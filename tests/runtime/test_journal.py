@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from runtime_fixtures import row
-from shift_runtime.journal import LOG_PAGES, PAGE_BYTES, Batch, Journal, StoredAnswer, digest_of
+from shift_runtime.journal import LOG_PAGES, PAGE_BYTES, Batch, Journal, StoredAnswer, digest_of, same_content
 from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
 
@@ -49,7 +49,7 @@ def seen(page: OutboxPage) -> list[tuple[str, int]]:
 
 def test_what_a_commit_held_is_there_after_reopening(path: Path) -> None:
     journal = opened(path)
-    answer = StoredAnswer(digest_of("asked"), '{"session": "s1"}')
+    answer = StoredAnswer('{"task":"one"}', '{"session": "s1"}')
     journal.commit(
         Batch({"s1": "state"}, {("s1", "decider"): 7}, [row(1), row(2)], {START: answer}, {"s1"}),
     )
@@ -79,7 +79,7 @@ def test_cursors_of_closed_sessions_are_forgotten(path: Path) -> None:
 
 def test_a_commit_that_breaks_in_its_middle_leaves_nothing_behind(path: Path) -> None:
     journal = filled(path, s1=2)
-    answer = StoredAnswer(digest_of("asked"), "{}")
+    answer = StoredAnswer('{"task":"one"}', "{}")
     with pytest.raises(Unavailable, match=r"the monitor cannot write its journal monitor\.sqlite"):
         journal.commit(Batch({"s1": "later"}, {("s1", "decider"): 9}, [row(3), row(2)], {START: answer}, {"s1"}))
     for there in (journal, opened(path)):
@@ -100,10 +100,34 @@ def test_the_first_answer_of_a_command_stays(path: Path) -> None:
     assert journal.answer(START) == StoredAnswer("first", '{"n":1}')
 
 
+def test_the_same_fields_in_another_order_are_the_same_content() -> None:
+    assert same_content('{"study": {"a": 1, "b": [2.0]}}', '{"study": {"b": [2], "a": 1}}')
+    assert not same_content('{"study": {"a": 1}}', '{"study": {"a": true}}')
+    assert not same_content('{"study": {"a": 1}}', '{"study": {}}')
+
+
+def test_a_journal_of_version_0_1_0_which_kept_digests_still_knows_a_repeat(path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    old = sqlite3.connect(path)
+    old.execute(
+        "CREATE TABLE answer (session TEXT, procedure TEXT, command_id TEXT, digest TEXT, result TEXT,"
+        " PRIMARY KEY (session, procedure, command_id)) WITHOUT ROWID"
+    )
+    old.execute("INSERT INTO answer VALUES (?, ?, ?, ?, ?)", (*START, digest_of('{"seed":7}'), '{"n":1}'))
+    old.commit()
+    old.close()
+    for _ in range(2):
+        stored = opened(path).answer(START)
+        assert stored is not None
+        assert stored.result == '{"n":1}'
+        assert same_content(stored.content, '{"seed":7}')
+        assert not same_content(stored.content, '{"seed":8}')
+
+
 def test_an_answer_that_is_a_fact_is_kept_once(path: Path) -> None:
     journal = opened(path)
     fact = row(2).model_copy(update={"payload": '{"n":2,"reason":"told once"}'})
-    answer = StoredAnswer("digest", fact.payload, seq=2)
+    answer = StoredAnswer("{}", fact.payload, seq=2)
     journal.commit(Batch(rows=[row(1), fact], answers={START: answer}))
     for there in (journal, opened(path)):
         assert there.answer(START) == answer

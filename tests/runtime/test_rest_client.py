@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -11,7 +12,15 @@ from typing import Any
 
 import pytest
 from shift_runtime.rest_client import RestClient
-from shift_schemas.errors import Conflict, FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
+from shift_schemas.errors import (
+    Conflict,
+    FieldError,
+    InvalidSettings,
+    MalformedMessage,
+    ShiftError,
+    Unavailable,
+    UnknownThing,
+)
 from shift_schemas.messages import GazeChunk
 
 
@@ -40,6 +49,9 @@ def gateway() -> Iterator[Gateway]:
             body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
             known.asked.append((self.command, self.path, json.loads(body) if body else None))
             status, content = known.answer()
+            if status == -1:  # the gateway hangs
+                time.sleep(1.0)
+                return
             if status == 0:  # the gateway dies in the middle of the request
                 self.connection.close()
                 return
@@ -137,6 +149,58 @@ def test_a_problem_arrives_as_the_error_that_it_was_and_is_not_asked_again(
     assert len(gateway.asked) == 1
 
 
+def test_every_field_of_a_problem_is_handed_on(gateway: Gateway, shift: RestClient) -> None:
+    errors = [{"field": f"{part}.duration_s", "value": "-1", "rule": "at least 0"} for part in ("one", "other")]
+    gateway.answers = [problem("malformed", "one.duration_s: at least 0", 422, errors)]
+    with pytest.raises(MalformedMessage, match=r"one\.duration_s: at least 0") as found:
+        shift.report("s1", "d1", True, -1, True, -1)
+    assert [e.field for e in found.value.errors] == ["one.duration_s", "other.duration_s"]
+
+
+def test_an_answer_that_takes_too_long_is_named_with_its_limit(gateway: Gateway) -> None:
+    gateway.answers = [(-1, None)]
+    limit = r"did not answer GET /v1/sessions/s1 within 0\.2 s"
+    with RestClient(gateway.url, patience_s=0.0, timeout_s=0.2) as shift, pytest.raises(Unavailable, match=limit):
+        shift.session("s1")
+
+
+@pytest.mark.parametrize("session", ["P 01", "a/b", "..", "", "ü", "x" * 64, "s1?x"])
+def test_a_session_that_is_not_an_id_never_becomes_another_path(
+    gateway: Gateway, shift: RestClient, session: str
+) -> None:
+    asking = (
+        lambda: shift.session(session),
+        lambda: shift.decide(session, "grasp"),
+        lambda: shift.report(session, "d1", True, 1.0, True, 1.0),
+        lambda: shift.end(session),
+        lambda: shift.config(session),
+        lambda: shift.observation(session),
+        lambda: shift.gaze(session, GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["cup"])),
+    )
+    for ask in asking:
+        with pytest.raises(MalformedMessage, match="an id is 1 to 63 letters") as found:
+            ask()
+        assert found.value.errors[0].field == "session"
+    assert gateway.asked == []
+    with pytest.raises(MalformedMessage, match="write for example 'P-01'"):
+        shift.end("P 01")
+
+
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), object()], ids=str)
+def test_what_json_cannot_say_is_refused_before_it_is_sent(gateway: Gateway, shift: RestClient, seconds: Any) -> None:
+    with pytest.raises(MalformedMessage, match="cannot be sent as JSON"):
+        shift.report("s1", "d1", True, seconds, True, 5.0)
+    with pytest.raises(MalformedMessage, match="cannot be sent as JSON"):
+        shift.start("P1", study={"study": "\ud800"})
+    assert gateway.asked == []
+
+
+@pytest.mark.parametrize("url", ["127.0.0.1:8080", "", "http://", "ftp://x", "http://a\x00b"])
+def test_a_url_that_cannot_be_a_gateway_s_is_refused_at_once(url: str) -> None:
+    with pytest.raises(InvalidSettings, match="the gateway's URL is"):
+        RestClient(url)
+
+
 def test_what_stays_unavailable_is_said_in_the_end(gateway: Gateway) -> None:
     gateway.answers = [problem("unavailable", "the monitor does not answer", 503)]
     with RestClient(gateway.url, patience_s=0.2) as shift, pytest.raises(Unavailable, match="the monitor does not"):
@@ -157,16 +221,16 @@ def test_an_error_that_does_not_say_why_is_an_error_all_the_same(
     gateway: Gateway, shift: RestClient, content: Any
 ) -> None:
     gateway.answers = [(500, content)]
-    with pytest.raises(ShiftError, match="answered 500 without saying why"):
+    with pytest.raises(ShiftError, match="is not a SHIFT gateway: it answered GET /v1/sessions/s1 with 500"):
         shift.session("s1")
 
 
 @pytest.mark.parametrize("content", [b"<html>welcome</html>", b"", b"[1]", b'"text"'])
 def test_another_server_on_the_port_is_no_gateway(gateway: Gateway, shift: RestClient, content: bytes) -> None:
     gateway.answers = [(200, content)]
-    with pytest.raises(ShiftError):
+    with pytest.raises(ShiftError, match="is not a SHIFT gateway"):
         shift.session("s1")
-    with pytest.raises(Unavailable, match="no gateway answers"):
+    with pytest.raises(Unavailable, match="is not a SHIFT gateway"):
         shift.ready()
 
 

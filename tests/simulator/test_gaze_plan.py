@@ -68,7 +68,7 @@ def test_other_attention_settings_are_planned_for(attention: dict[str, float]) -
 def test_what_no_gaze_can_reach_is_said() -> None:
     one = study_with(1)
     assert classes_reached(one, ["uncertain", "focused"]) == ["uncertain", "focused"]
-    with pytest.raises(InvalidSettings, match="no gaze on the 1 AOIs of study s makes the gaze class distracted"):
+    with pytest.raises(InvalidSettings, match="study s, no gaze on its 1 AOIs brings about the gaze class distracted"):
         classes_reached(one, ["distracted"])
 
 

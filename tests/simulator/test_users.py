@@ -61,7 +61,7 @@ def test_a_change_holds_after_that_many_interactions() -> None:
         (text(capacity={"recover": 1}), "capacity.recover is 1: Extra inputs"),
         (text(changes=[{"at": 9, "success": [[1] * 6] * 30}] * 2), "changes must be in rising order of at"),
         ('{"user": "x", "user": "y"}', "'user' is given twice"),
-        ('{"user": NaN}', "NaN is not a number that JSON knows"),
+        ('{"user": NaN}', "NaN is not a number in JSON"),
         ("[1", "this is not a user file in JSON"),
         ("[" * 100_000, "this is not a user file in JSON"),
         ('{"user": "x"}', "success is missing"),
@@ -80,7 +80,7 @@ def test_a_true_capacity_that_contradicts_the_study_is_refused() -> None:
 
 
 def test_an_unknown_built_in_user_is_refused_with_those_that_there_are() -> None:
-    with pytest.raises(InvalidSettings, match="no built-in user 'E'; there are A, B, C, D"):
+    with pytest.raises(InvalidSettings, match="no built-in user 'E'; write one of A, B, C, D"):
         paper_user("E")
 
 

@@ -215,4 +215,4 @@ def _cells(line: str) -> list[str]:
 
 def _mistake(file: str, line: int, field: str, value: str, rule: str) -> MalformedMessage:
     error = FieldError(field=field, value=shorten(value), rule=rule)
-    return MalformedMessage(f"{file}:{line}: {field}: {error.value!r} does not do: {rule}", (error,))
+    return MalformedMessage(f"{file}:{line}: {field}: {error.value!r} is not valid: {rule}", (error,))

@@ -1,17 +1,15 @@
 """``shift-mesh``: the command line. Every flag is an environment variable too (``SHIFT_PORT``).
 
-Exit codes: 0 fine, 1 the thing checked is not so, 2 wrong use. What is heavy is imported by the
-command that needs it, so that ``--help`` answers at once.
+Heavy modules are imported by the command that needs them, so that ``--help`` answers at once. ``entry`` turns every
+error into one sentence and an exit code.
 """
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from shift_schemas.errors import ShiftError
 from shift_simulator import commands as evaluate_commands
 
 from shift_cli import (
@@ -30,21 +28,51 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="rich",
-    help="How should the robot phrase its next explanation for this person, now?",
 )
+
+
+def _say_version(wanted: bool) -> None:
+    if wanted:
+        from shift_cli.version import version_line
+
+        typer.echo(version_line())
+        raise typer.Exit()
+
+
+@app.callback()
+def shift_mesh(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Show the version, Python and the git revision.", callback=_say_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """How should the robot phrase its next explanation for this person, now?
+
+    Exit codes: 0 fine, 1 what was checked is not so, 2 wrong use or it could not be done, 130 after Ctrl-C.
+
+    \b
+    shift-mesh up --demo          # run the mesh here, with a simulated person
+    shift-mesh doctor             # is everything reachable?
+    shift-mesh simulate --help    # what a command does, its options and their environment variables
+    """
 
 
 @app.command()
 def up(
-    demo: Annotated[bool, typer.Option(help="A simulated person in session demo.", envvar="SHIFT_DEMO")] = False,
+    demo: Annotated[bool, typer.Option(help="Add a simulated person, in session demo.", envvar="SHIFT_DEMO")] = False,
     host: Annotated[str, typer.Option(help="Address of the gateway.", envvar="SHIFT_HOST")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port of the gateway.", envvar="SHIFT_PORT", min=1, max=65535)] = 8080,
     zenoh: Annotated[
         str, typer.Option(help="Endpoint of the mesh's router.", envvar="SHIFT_ZENOH")
     ] = "tcp/127.0.0.1:7447",
-    data: Annotated[Path, typer.Option(help="Recordings, studies and journals.", envvar="SHIFT_DATA")] = Path("data"),
+    data: Annotated[Path, typer.Option(help="Folder of recordings, studies and journals.", envvar="SHIFT_DATA")] = Path(
+        "data"
+    ),
     router: Annotated[
-        str | None, typer.Option(help="A router that runs already; none is started then.", envvar="SHIFT_ROUTER")
+        str | None,
+        typer.Option(help="Endpoint of a router that runs already; then none is started.", envvar="SHIFT_ROUTER"),
     ] = None,
 ) -> None:
     """Run the mesh on this machine until Ctrl-C.
@@ -60,7 +88,12 @@ def up(
 
 @app.command()
 def router() -> None:
-    """Run the router alone; it listens on SHIFT_ROUTER_LISTEN."""
+    """Run the router alone until Ctrl-C. It listens on the endpoint in SHIFT_ROUTER_LISTEN, else tcp/127.0.0.1:7447.
+
+    \b
+    shift-mesh router
+    SHIFT_ROUTER_LISTEN=tcp/0.0.0.0:7447 shift-mesh router    # for other machines as well
+    """
     from shift_runtime.router import main as run_router
 
     run_router()
@@ -78,12 +111,10 @@ app.add_typer(evaluate_commands.app, name="evaluate")
 
 
 def main() -> None:
-    """The entry point: an error of ours is one sentence and exit code 2, never a traceback."""
-    try:
-        app()
-    except ShiftError as e:
-        sys.stderr.write(f"shift-mesh: {e.detail}\n")
-        sys.exit(2)
+    """Run the command line; see :mod:`shift_cli.entry`."""
+    from shift_cli.entry import run
+
+    run(app)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -14,13 +14,19 @@ CONTEXT = {"allow_extra_args": True, "ignore_unknown_options": True}
 def ros2(
     context: typer.Context,
     backend: Annotated[
-        str | None,
-        typer.Option(help="native: speaks rmw_zenoh itself, no ROS needed here; or rclpy.", envvar="SHIFT_BACKEND"),
+        Literal["native", "rclpy"] | None,
+        typer.Option(
+            help="native (the default) speaks rmw_zenoh itself and needs no ROS here; rclpy needs a ROS 2.",
+            envvar="SHIFT_BACKEND",
+        ),
     ] = None,
-    session: Annotated[str | None, typer.Option(help="The session.", envvar="SHIFT_SESSION")] = None,
+    session: Annotated[str | None, typer.Option(help="Id of the session.", envvar="SHIFT_SESSION")] = None,
     zenoh: Annotated[str | None, typer.Option(help="Endpoint of the mesh's router.", envvar="SHIFT_ZENOH")] = None,
     ros_router: Annotated[
-        str | None, typer.Option(help="Router of the ROS nodes: tcp/localhost:7447.", envvar="SHIFT_ROS_ROUTER")
+        str | None,
+        typer.Option(
+            help="Endpoint of the ROS nodes' router; left out: tcp/localhost:7447.", envvar="SHIFT_ROS_ROUTER"
+        ),
     ] = None,
 ) -> None:
     """Run the bridge to ROS 2 until Ctrl-C: a node with topics and a service, for robots.

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import IO
 
 from rich.console import Console
-from shift_schemas.errors import InvalidSettings
+from shift_runtime.endpoints import parse_endpoint
+from shift_runtime.settings import read_settings
+from shift_schemas.errors import InvalidSettings, shorten
 
 from shift_cli.supervisor import Program, Supervisor, programs
 
@@ -20,17 +22,21 @@ console = Console(stderr=True, highlight=False)
 
 
 def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str | None) -> int:
-    """Run the mesh until Ctrl-C or SIGTERM; the exit code.
+    """Run the mesh until Ctrl-C or SIGTERM; return the exit code.
 
     Raises
     ------
     InvalidSettings
-        A port is taken, or the data folder cannot be used or is in use.
+        A flag or variable has a wrong value, a port is taken, or the data folder cannot be used or is in use.
     """
+    endpoint = parse_endpoint(zenoh, "--zenoh")
+    if router is not None:
+        parse_endpoint(router, "--router")
+    read_settings()
     lock = _lock(data)
-    _check_free(host, port, "port", "--port")
+    _check_free(host, port, "--port")
     if router is None:
-        _check_free(*_endpoint(zenoh), "endpoint", "--zenoh")
+        _check_free(*endpoint, "--zenoh")
     url = f"http://{LOCAL.get(host, host)}:{port}"
     os.environ |= {
         "SHIFT_DATA": str(data), "SHIFT_HOST": host, "SHIFT_PORT": str(port), "SHIFT_URL": url,
@@ -46,7 +52,7 @@ def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str
 
 
 class _Announcer:
-    """Says once when everything is ready."""
+    """Tells the user once that everything is ready."""
 
     def __init__(self, host: str, port: int, url: str, mesh: list[Program]) -> None:
         self._host, self._port, self._url, self._mesh = host, port, url, mesh
@@ -54,7 +60,7 @@ class _Announcer:
         self._done = False
 
     def tick(self) -> None:
-        """Look; nothing more once it was said."""
+        """Poll readiness; announce it once."""
         if self._done or not self._ready():
             return
         self._done = True
@@ -74,13 +80,15 @@ class _Announcer:
 
 
 def _lock(data: Path) -> IO[str]:
-    """The data folder is one mesh's at a time: two would write the same journals."""
+    """Lock the data folder: two meshes would write the same journals."""
     try:
         (data / "state").mkdir(parents=True, exist_ok=True)
         (data / "studies").mkdir(exist_ok=True)
         file = open(data / "state" / "lock", "w")  # noqa: SIM115 (held for as long as the mesh runs)
     except OSError as e:
-        raise InvalidSettings(f"{data} cannot be used: {e.strerror}; give another folder with --data") from e
+        raise InvalidSettings(
+            f"the data folder {data} cannot be used: {e.strerror}; give another folder with --data"
+        ) from e
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as e:
@@ -88,19 +96,20 @@ def _lock(data: Path) -> IO[str]:
     return file
 
 
-def _endpoint(zenoh: str) -> tuple[str, int]:
-    protocol, _, rest = zenoh.partition("/")
-    host, _, port = rest.partition("?")[0].rpartition(":")
-    if protocol not in ("tcp", "tls", "quic") or not host or not port.isdigit():
-        raise InvalidSettings(f"--zenoh is {zenoh!r}: an endpoint is PROTOCOL/HOST:PORT, such as tcp/127.0.0.1:7447")
-    return host.strip("[]"), int(port)
-
-
-def _check_free(host: str, port: int, what: str, flag: str) -> None:
+def _check_free(host: str, port: int, flag: str) -> None:
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+    except (OSError, UnicodeError) as e:
+        where = "--host" if flag == "--port" else flag
+        raise InvalidSettings(f"{where} names the host {shorten(host)!r}, which is not known: {_why(e)}") from e
+    try:
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind((host, port))
     except OSError as e:
-        raise InvalidSettings(f"{what} {host}:{port} cannot be used: {e.strerror}; choose another with {flag}") from e
+        said = f"{host}:{port} cannot be used: {e.strerror}; choose another with {flag}"
+        raise InvalidSettings(f"{'port' if flag == '--port' else 'endpoint'} {said}") from e
+
+
+def _why(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)

@@ -199,7 +199,7 @@ def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: S
     if missing.owners and not late:
         raise NotYet(missing.owners, study.decider.wait_s)
     if state.observation is None or state.config is None:
-        raise Unavailable("the monitor has put out no observation of this session yet")
+        raise Unavailable("the monitor has not published an observation of this session yet; ask again")
     triple = triple_of(state.observation, task)
     found = reductions(state.config.study)[triple]
     choice = _choose(state, study, task, triple, found, missing)
@@ -307,5 +307,5 @@ def _study(state: DeciderState, missing: Lacks, late: bool) -> Study:
     if missing.config and not late:
         raise NotYet(("recorder",), study_from_json(state.config.study).decider.wait_s if state.config else 2.0)
     if state.config is None:
-        raise Unavailable("the recorder has put out no configuration of this session yet")
+        raise Unavailable("the recorder has not published a configuration of this session yet; ask again")
     return study_from_json(state.config.study)

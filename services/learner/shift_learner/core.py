@@ -360,7 +360,7 @@ def _seen(state: LearnerState) -> Seen:
 
 def _context(state: LearnerState) -> Context:
     if state.config is None:
-        raise Unavailable("the recorder has put out no configuration of this session yet")
+        raise Unavailable("the recorder has not published a configuration of this session yet; ask again")
     return context_of(state.config.study)
 
 

@@ -42,7 +42,7 @@ class RosArguments:
 
 
 def parse_ros_args(line: Sequence[str]) -> RosArguments:
-    """Take a command line apart. Raises :class:`InvalidSettings` with the word that does not do."""
+    """Take a command line apart. Raises :class:`InvalidSettings` that names the word at fault."""
     found = RosArguments()
     words = list(line)
     inside = False
@@ -66,7 +66,9 @@ def parse_ros_args(line: Sequence[str]) -> RosArguments:
         elif word in _IGNORED_WITH_VALUE:
             _value(word, words)
         elif word not in _IGNORED:
-            raise InvalidSettings(f"--ros-args: {shorten(word)!r} is none of -r, -p, --params-file, --log-level")
+            raise InvalidSettings(
+                f"--ros-args: {shorten(word)!r} is not known here; write one of -r, -p, --params-file, --log-level"
+            )
     return found
 
 
@@ -89,7 +91,7 @@ def parameters_of(text: str, file: str, full_name: str, known: Callable[[str], b
             raise InvalidSettings(f"{file}: {pattern}: ros__parameters maps names to values")
         for name, value in parameters.items():
             if "*" not in pattern and not known(name):
-                raise InvalidSettings(f"{file}: {pattern}: {shorten(name)!r} is no parameter of the bridge")
+                raise InvalidSettings(f"{file}: {pattern}: {shorten(name)!r} is not a parameter of the bridge")
             if known(name) and value is not None:
                 found[name] = _scalar(name, value)
     return found

@@ -100,7 +100,7 @@ class Bridge:
             return False, mapping.text_of_error(e)
         except Exception:
             log.exception("a request failed")
-            error = ShiftError("something went wrong inside the bridge")
+            error = ShiftError("something went wrong inside the bridge; see its log")
             self.on_lost("next_strategy", error)
             return False, mapping.text_of_error(error)
         return True, answer

@@ -66,7 +66,9 @@ class CdrReader:
     def _bytes(self, length: int) -> bytes:
         end = self._at + length
         if end > len(self._data):
-            raise MalformedMessage(f"cdr: {length} bytes wanted, {max(0, len(self._data) - self._at)} left")
+            raise MalformedMessage(
+                f"cdr: the message is too short: {length} bytes must follow, {max(0, len(self._data) - self._at)} do"
+            )
         found = self._data[self._at : end]
         self._at = end
         return found

@@ -125,7 +125,7 @@ def _object(what: str, text: str) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise _refused(what, "data", data, "a JSON object")
     if "\\u" in text and not _sayable(data):
-        raise _refused(what, "data", "", "text must be Unicode; half a surrogate pair is none")
+        raise _refused(what, "data", "", "text must be Unicode; a lone surrogate is not a character")
     return data
 
 

@@ -217,7 +217,7 @@ class NativeBackend:
             raise MalformedMessage(f"type hash {shorten(written)}: {kind.name} is {kind.hash}")
 
     def _overflowed(self, topic: str, number: int) -> None:
-        error = ShiftError("more came than could be read; it was dropped")
+        error = ShiftError("messages came faster than the bridge could read them; some were dropped")
         self._handlers.on_lost(topic, error, number, reason="overload")
 
 
@@ -230,7 +230,7 @@ def ros_config(settings: BridgeSettings) -> zenoh.Config:
             path, _, value = entry.partition("=")
             config.insert_json5(path.strip(), value.strip() or json.dumps(None))
     except zenoh.ZError as e:
-        raise InvalidSettings(f"ros_router {settings.ros_router} or {OVERRIDE} does not do: {e}") from e
+        raise InvalidSettings(f"ros_router {settings.ros_router} or {OVERRIDE} is not valid: {e}") from e
     return config
 
 
@@ -240,5 +240,5 @@ def _copied(sample: zenoh.Sample) -> tuple[str, bytes, bytes | None]:
 
 def _attachment_of(data: bytes | None) -> Attachment:
     if data is None:
-        raise MalformedMessage("attachment: none: rmw_zenoh sends 33 bytes with each sample and request")
+        raise MalformedMessage("attachment: it is missing: rmw_zenoh sends 33 bytes with each sample and request")
     return Attachment.decode(data)

@@ -167,7 +167,7 @@ class RclpyBackend:
             self._handlers.on_lost(topic, e)
 
     def _overflowed(self, topic: str, number: int) -> None:
-        error = ShiftError("more came than could be read; it was dropped")
+        error = ShiftError("messages came faster than the bridge could read them; some were dropped")
         self._handlers.on_lost(topic, error, number, reason="overload")
 
     # --- ROS4HRI, where hri_msgs is installed ---

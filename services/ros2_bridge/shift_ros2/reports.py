@@ -30,7 +30,7 @@ class Reports:
     def put(self, topic: str, work: Work) -> None:
         """Hand it on in its turn. Raises :class:`Unavailable` where too many wait."""
         if len(self._waiting) >= WAITING:
-            raise Unavailable(f"{WAITING} messages wait already to be handed on")
+            raise Unavailable(f"{WAITING} messages already wait to be forwarded; this one was dropped")
         self._progress.came()
         self._waiting.append((topic, work))
         self._wake.set()
@@ -66,5 +66,5 @@ class Reports:
                 return
             except Exception:
                 log.exception("a message could not be handed on", topic=topic)
-                self._lost(topic, ShiftError("something went wrong inside the bridge"))
+                self._lost(topic, ShiftError("something went wrong inside the bridge; see its log"))
                 return

@@ -105,7 +105,7 @@ class GazeSender:
             self._lost("gaze", e, samples)
         except Exception:
             log.exception("gaze could not be handed on", session=self._session)
-            self._lost("gaze", ShiftError("something went wrong inside the bridge"), samples)
+            self._lost("gaze", ShiftError("something went wrong inside the bridge; see its log"), samples)
 
     async def _hand_on(self, taken: list[GazeArrival]) -> None:
         await self._attach(self._session)

@@ -32,7 +32,7 @@ DRAIN_S = 2.0
 
 
 def run_bridge(line: Sequence[str]) -> None:
-    """Run until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that do not do."""
+    """Run until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that are not valid."""
     try:
         settings = bridge_settings(line)
         configure_logs(SERVICE, settings)

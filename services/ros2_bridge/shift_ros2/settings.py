@@ -62,7 +62,7 @@ class BridgeSettings(MeshSettings):
         named = self.namespace.rpartition("/")[2] or DEFAULT_SESSION
         if not is_id(named):
             rule = f"{not_an_id(named)}; set parameter session"
-            raise InvalidSettings(f"namespace {self.namespace} names no session: {rule}")
+            raise InvalidSettings(f"namespace {self.namespace} does not end with a session's id: {rule}")
         return named
 
     @property
@@ -85,7 +85,7 @@ def bridge_settings(line: Sequence[str]) -> BridgeSettings:
     Raises
     ------
     InvalidSettings
-        A flag, parameter, file or name does not do.
+        A flag, parameter, file or name is not valid.
     """
     arguments = parse_ros_args(line)
     given: dict[str, Any] = _flags(arguments.rest)
@@ -119,9 +119,9 @@ def _flags(words: list[str]) -> dict[str, str]:
     while words:
         word, _, value = words.pop(0).partition("=")
         if word not in _FLAGS:
-            raise InvalidSettings(f"{word!r} is none of {', '.join(_FLAGS)}, --ros-args")
+            raise InvalidSettings(f"{word!r} is not a flag of the bridge; write one of {', '.join(_FLAGS)}, --ros-args")
         if not value and not words:
-            raise InvalidSettings(f"{word} needs a value")
+            raise InvalidSettings(f"{word} has no value; write one after it")
         given[_FLAGS[word]] = value or words.pop(0)
     return given
 
@@ -135,5 +135,7 @@ def _parameters(arguments: RosArguments, full_name: str) -> Parameters:
             raise InvalidSettings(f"--params-file {file} cannot be read: {e}") from e
         found |= parameters_of(text, file, full_name, PARAMETERS.__contains__)
     if unknown := sorted(set(arguments.parameters) - PARAMETERS):
-        raise InvalidSettings(f"{unknown[0]!r} is no parameter of the bridge: {', '.join(sorted(PARAMETERS))}")
+        raise InvalidSettings(
+            f"{unknown[0]!r} is not a parameter of the bridge; it has {', '.join(sorted(PARAMETERS))}"
+        )
     return found | arguments.parameters

@@ -47,16 +47,22 @@ class CommandDoor:
         self.replica = replica
 
     async def start(self, body: StartBody) -> tuple[dict[str, Any], bool]:
-        """Begin a session; the answer, and whether it is a repeat's."""
+        """Begin a session; return the session and whether it was begun before, by the same start.
+
+        A repeat gets the first result with what has changed since: the session may be ending or have ended.
+        """
         session = body.session or new_id("s-")
         command = StartSession(
             command_id=START_ID, session=session, participant=body.participant, study=body.study,
             seed=body.seed, condition=body.condition,
         )  # fmt: skip
         answer = await self.mesh.command(command)
-        await self.replica.view(session)
+        view = await self.replica.view(session)
         self._remember(session, answer, config=1)
-        return answer.result, answer.repeat
+        if not answer.repeat:
+            return answer.result, False
+        await self._read(view, ("recorder",))
+        return view.fact.model_dump(mode="json", include=set(answer.result)), True
 
     async def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Hand gaze to the monitor; acknowledged once it is in the journal."""

@@ -15,19 +15,23 @@ import sys
 from urllib.parse import urlsplit
 
 TIMEOUT_S = 2.0
+CHECKED = ("router", "gateway", "recorder", "monitor", "decider", "learner", "simulator")
 
 
 def main(arguments: list[str]) -> int:
     """The exit code for ``[service]``; 2 for wrong use."""
-    if len(arguments) != 1:
-        sys.stderr.write("give one service: router, gateway, recorder, monitor, decider, learner or simulator\n")
+    if len(arguments) != 1 or arguments[0] not in CHECKED:
+        sys.stderr.write(f"give one service: {', '.join(CHECKED)}\n")
         return 2
     checks = {"router": _router, "gateway": _gateway, "simulator": _simulator}
     try:
         healthy = checks[arguments[0]]() if arguments[0] in checks else _service(arguments[0])
-    except OSError as e:
-        sys.stderr.write(f"{arguments[0]}: {e}\n")
+    except (OSError, http.client.HTTPException) as e:
+        sys.stderr.write(f"the {arguments[0]} does not answer: {e or type(e).__name__}\n")
         return 1
+    except ValueError as e:
+        sys.stderr.write(f"a port or address in the environment (SHIFT_...) is wrong: {e}\n")
+        return 2
     return 0 if healthy else 1
 
 

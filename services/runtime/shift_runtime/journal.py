@@ -17,6 +17,7 @@ from pathlib import Path
 
 from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
+from shift_schemas.repeats import differences
 
 from shift_runtime.claim import mesh_id
 
@@ -27,7 +28,7 @@ CREATE TABLE IF NOT EXISTS cursor (
     session TEXT, owner TEXT, seq INTEGER, PRIMARY KEY (session, owner)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS state (session TEXT PRIMARY KEY, data TEXT, closed INTEGER DEFAULT 0) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS answer (
-    session TEXT, procedure TEXT, command_id TEXT, digest TEXT, result TEXT,
+    session TEXT, procedure TEXT, command_id TEXT, content TEXT, result TEXT,
     PRIMARY KEY (session, procedure, command_id)) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS place (one INTEGER PRIMARY KEY, file TEXT);
 """
@@ -40,9 +41,10 @@ AnswerKey = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class StoredAnswer:
-    """The first result of a command, and a digest of what was asked."""
+    """What was asked the first time a command's id was used, and its result."""
 
-    digest: str
+    content: str
+    """As JSON; a journal of version 0.1.0 kept :func:`digest_of` it."""
     result: str
     """As JSON."""
     seq: int = 0
@@ -64,7 +66,7 @@ class Batch:
 
 
 def digest_of(content: str) -> str:
-    """A short fingerprint of a command's content."""
+    """Return the fingerprint of a command's content that a journal of version 0.1.0 kept."""
     return hashlib.sha256(content.encode()).hexdigest()[:32]
 
 
@@ -72,6 +74,13 @@ def _index(subject: str, fields: tuple[str, ...]) -> str:
     """Names come from the code, never from a message."""
     columns = "".join(f", json_extract(payload, '$.{name}')" for name in fields)
     return f"CREATE INDEX IF NOT EXISTS outbox_{subject} ON outbox (session{columns}) WHERE subject = '{subject}'"
+
+
+def same_content(before: str, now: str) -> bool:
+    """Return whether two contents of a command are the same; ``before`` may be a digest."""
+    if before == now or before == digest_of(now):
+        return True
+    return before.startswith("{") and not differences(before, now)
 
 
 class Journal:
@@ -100,6 +109,7 @@ class Journal:
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
             self._db.executescript(_TABLES)
+            self._rename_digests()
             self._check_copy()
             self.heads = self._heads()
             for subject, fields in self._lookups.items():
@@ -142,6 +152,11 @@ class Journal:
             )
         self._db.execute("INSERT OR REPLACE INTO place VALUES (1, ?)", (place,))
 
+    def _rename_digests(self) -> None:
+        """Bring a journal of version 0.1.0 to this one's columns."""
+        if any(row[1] == "digest" for row in self._db.execute("PRAGMA table_info(answer)")):
+            self._db.execute("ALTER TABLE answer RENAME COLUMN digest TO content")
+
     def _grow_log(self) -> None:
         """Give the write-ahead log its full length now: a commit that overwrites syncs faster than one that appends.
 
@@ -182,15 +197,15 @@ class Journal:
         """The first result of a command, if it was carried out."""
         if key[1:] not in self._commands(key[0]):
             return None
-        digest, text = self._db.execute(
-            "SELECT digest, result FROM answer WHERE session = ? AND procedure = ? AND command_id = ?", key
+        content, text = self._db.execute(
+            "SELECT content, result FROM answer WHERE session = ? AND procedure = ? AND command_id = ?", key
         ).fetchone()
         if not text.isdigit():
-            return StoredAnswer(digest, text)
+            return StoredAnswer(content, text)
         (payload,) = self._db.execute(
             "SELECT payload FROM outbox WHERE session = ? AND seq = ?", (key[0], int(text))
         ).fetchone()
-        return StoredAnswer(digest, payload, int(text))
+        return StoredAnswer(content, payload, int(text))
 
     def _commands(self, session: str) -> set[tuple[str, str]]:
         if session not in self._answered:
@@ -266,7 +281,7 @@ class Journal:
             "INSERT OR REPLACE INTO cursor VALUES (?, ?, ?)": [(*key, n) for key, n in batch.cursors.items()],
             "INSERT INTO outbox VALUES (?, ?, ?, ?)": [(r.session, r.seq, r.subject, r.payload) for r in batch.rows],
             "INSERT INTO answer VALUES (?, ?, ?, ?, ?)": [
-                (*key, a.digest, str(a.seq or a.result)) for key, a in batch.answers.items()
+                (*key, a.content, str(a.seq or a.result)) for key, a in batch.answers.items()
             ],
             "UPDATE state SET closed = 1 WHERE session = ?": [(s,) for s in batch.closed],
         }

@@ -13,7 +13,7 @@ from shift_runtime.settings import MeshSettings
 
 def configure_logs(service: str, settings: MeshSettings) -> None:
     """Set up structlog for this process."""
-    level = logging.getLevelName(settings.log_level.upper())
+    level = logging.getLevelNamesMapping()[settings.log_level.upper()]
     renderer: Any = (
         structlog.processors.JSONRenderer()
         if settings.log_json
@@ -27,7 +27,7 @@ def configure_logs(service: str, settings: MeshSettings) -> None:
             structlog.processors.format_exc_info,
             renderer,
         ],
-        wrapper_class=structlog.make_filtering_bound_logger(level if isinstance(level, int) else logging.INFO),
+        wrapper_class=structlog.make_filtering_bound_logger(level),
         logger_factory=structlog.PrintLoggerFactory(file=sys.stderr),
         cache_logger_on_first_use=True,
     )

@@ -28,7 +28,7 @@ WorkerKind = Callable[..., Worker[Any]]
 
 
 def run_service(core: Core[Any], kind: WorkerKind = Worker) -> None:
-    """Run a service until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that do not do."""
+    """Run a service until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that are not valid."""
     try:
         settings = read_settings()
         configure_logs(core.name, settings)

@@ -44,7 +44,7 @@ def fact_of(row: OutboxRow) -> Fact:
     """The fact of an outbox row. Raises :class:`MalformedMessage`."""
     kind = FACTS.get(row.subject)
     if kind is None:
-        raise MalformedMessage(f"{row.subject!r} is no subject")
+        raise MalformedMessage(f"{row.subject!r} is not a subject of this mesh")
     fact = decode(kind, row.payload)
     if fact.session != row.session:
         raise MalformedMessage(f"a {row.subject} of session {fact.session} under session {row.session}")
@@ -109,10 +109,10 @@ class Reader:
         try:
             key = parse_key(incoming.key)
             if not isinstance(key, FactKey):
-                raise MalformedMessage(f"{incoming.key} is no fact's key")
+                raise MalformedMessage(f"{incoming.key} is not the key of an event")
             number = incoming.attachment.removeprefix(REPLAY_MARK)
             if not number.isdigit() or len(number) > 15:
-                raise MalformedMessage(f"a {key.subject} without a sequence")
+                raise MalformedMessage(f"a message of {key.subject} has no sequence number")
             row = OutboxRow(
                 session=key.session,
                 seq=int(number),

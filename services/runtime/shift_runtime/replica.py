@@ -59,7 +59,7 @@ class View:
     def study(self) -> Study:
         """The study in force. Raises :class:`Unavailable` before it is known."""
         if self.config is None:
-            raise Unavailable("the recorder has put out no configuration of this session yet")
+            raise Unavailable("the recorder has not published a configuration of this session yet; ask again")
         return study_from_json(self.config.study)
 
     @property

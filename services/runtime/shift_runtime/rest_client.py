@@ -1,36 +1,68 @@
 """A client of the gateway's REST paths, for the command line, the simulator and people's own Python.
 
-Every command carries an id, so a request that got no answer is sent again safely. Errors arrive as the
-error tree's. ::
+Every command carries an id, so a request that got no answer is sent again safely. ::
 
     with RestClient("http://127.0.0.1:8080") as shift:
         shift.start("P01", session="s1")
         decision = shift.decide("s1", "grasp")
         shift.report("s1", decision["decision_id"], True, 5.0, True, 6.0)
         shift.end("s1")
+
+Every error is a :class:`shift_schemas.errors.ShiftError` whose text is a sentence: ``MalformedMessage`` for a value
+that breaks a rule (its ``errors`` name field, value and rule), ``UnknownThing``, ``Conflict``, ``Unavailable`` for a
+gateway or service that does not answer, ``InvalidSettings`` for a URL that is not one.
 """
 
 from __future__ import annotations
 
+import json
 import secrets
 from types import TracebackType
 from typing import Any
 
 import httpx
-from shift_schemas.errors import FieldError, Problem, ShiftError, Unavailable
+from shift_schemas.errors import check_id, (
+    FieldError,
+    InvalidSettings,
+    MalformedMessage,
+    Problem,
+    ShiftError,
+    Unavailable,
+    shorten,
+)
 from shift_schemas.messages import GazeChunk
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_exponential
 
+from shift_runtime.endpoints import check_url
+
 TIMEOUT_S = 60.0
 """A decision may wait for its study's ``wait_s``; longer than any that is sensible."""
+READY_TIMEOUT_S = 5.0
+START = "start one with: shift-mesh up"
 
 
 class RestClient:
-    """See the module. ``patience_s`` is how long a gateway or service may be away before it is an error."""
+    """Asks the gateway at ``url``.
 
-    def __init__(self, url: str, patience_s: float = 15.0) -> None:
-        self.url = url.rstrip("/")
-        self._http = httpx.Client(base_url=self.url, timeout=TIMEOUT_S)
+    Parameters
+    ----------
+    patience_s
+        How long a gateway or service may be away before that is an error.
+    timeout_s
+        How long a single request may take.
+
+    Raises
+    ------
+    InvalidSettings
+        ``url`` is not the URL of a gateway.
+    """
+
+    def __init__(self, url: str, patience_s: float = 15.0, timeout_s: float = TIMEOUT_S) -> None:
+        self.url = check_url(url)
+        try:
+            self._http = httpx.Client(base_url=self.url, timeout=timeout_s)
+        except (httpx.InvalidURL, UnicodeError) as e:
+            raise InvalidSettings(f"the gateway's URL is {shorten(url)!r}: {e}") from e
         self._retrying = Retrying(
             retry=retry_if_exception_type(Unavailable),
             stop=stop_after_delay(patience_s),
@@ -53,12 +85,12 @@ class RestClient:
 
     def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Stream a chunk in."""
-        return self._ask("POST", f"/v1/sessions/{session}/gaze", chunk.model_dump(mode="json", exclude_none=True))
+        return self._ask("POST", _path(session, "/gaze"), chunk.model_dump(mode="json", exclude_none=True))
 
     def decide(self, session: str, task: str, decision_id: str | None = None) -> dict[str, Any]:
         """The strategy to use now."""
         body = {"task": task, "decision_id": decision_id or f"d-{secrets.token_hex(8)}"}
-        return self._ask("POST", f"/v1/sessions/{session}/decisions", body)
+        return self._ask("POST", _path(session, "/decisions"), body)
 
     def report(
         self, session: str, decision_id: str, understood: bool, understood_s: float, able: bool, able_s: float,
@@ -70,62 +102,95 @@ class RestClient:
             "comprehension": {"success": understood, "duration_s": understood_s},
             "enabledness": {"success": able, "duration_s": able_s},
         } | ({"corrects": True} if corrects else {})
-        return self._ask("POST", f"/v1/sessions/{session}/performance", body)
+        return self._ask("POST", _path(session, "/performance"), body)
 
     def end(self, session: str) -> dict[str, Any]:
         """End the session; its recording is finished then."""
-        return self._ask("POST", f"/v1/sessions/{session}/end")
+        return self._ask("POST", _path(session, "/end"))
 
     def session(self, session: str) -> dict[str, Any]:
         """The session, with counts so far."""
-        return self._ask("GET", f"/v1/sessions/{session}")
+        return self._ask("GET", _path(session))
 
     def observation(self, session: str) -> dict[str, Any]:
         """The partner model."""
-        return self._ask("GET", f"/v1/sessions/{session}/observation")
+        return self._ask("GET", _path(session, "/observation"))
 
     def config(self, session: str) -> dict[str, Any]:
         """The study in force, with its version."""
-        return self._ask("GET", f"/v1/sessions/{session}/config")
+        return self._ask("GET", _path(session, "/config"))
 
     def ready(self) -> dict[str, Any]:
-        """What ``/readyz`` says, ready or not. Raises :class:`Unavailable` without a gateway."""
+        """Return what ``/readyz`` says, ready or not. Raise :class:`Unavailable` where no gateway answers."""
         try:
-            return self._object(self._http.get("/readyz", timeout=5.0))
-        except (httpx.HTTPError, ShiftError) as e:
-            said = e.detail if isinstance(e, ShiftError) else e
-            raise Unavailable(f"no gateway answers at {self.url}: {said}; start one with: shift-mesh up") from e
+            return self._object(self._http.get("/readyz", timeout=READY_TIMEOUT_S))
+        except httpx.HTTPError as e:
+            raise Unavailable(f"no gateway answers at {self.url}: {e or type(e).__name__}; {START}") from e
+        except ShiftError as e:
+            raise Unavailable(e.detail) from e
 
     def _ask(self, method: str, path: str, body: Any = None) -> dict[str, Any]:
+        content = None if body is None else _json(body)
         for attempt in self._retrying:
             with attempt:
-                return self._once(method, path, body)
+                return self._once(method, path, content)
         raise AssertionError("tenacity either returns or raises")
 
-    def _once(self, method: str, path: str, body: Any) -> dict[str, Any]:
+    def _once(self, method: str, path: str, content: bytes | None) -> dict[str, Any]:
+        headers = {} if content is None else {"Content-Type": "application/json"}
         try:
-            response = self._http.request(method, path, json=body)
+            response = self._http.request(method, path, content=content, headers=headers)
+        except httpx.ConnectTimeout as e:
+            raise Unavailable(f"no gateway answers at {self.url}: the connection took too long; {START}") from e
+        except httpx.TimeoutException as e:
+            limit = self._http.timeout.read
+            raise Unavailable(f"the gateway at {self.url} did not answer {method} {path} within {limit:g} s") from e
         except httpx.TransportError as e:
-            raise Unavailable(f"no gateway answers at {self.url}: {e or type(e).__name__}") from e
+            raise Unavailable(f"no gateway answers at {self.url}: {e or type(e).__name__}; {START}") from e
+        except httpx.RequestError as e:  # its body cannot be decoded
+            raise self._stranger(f"{e or type(e).__name__}") from e
         if response.is_success:
             return self._object(response)
-        raise _error_of(response)
+        raise self._error_of(response)
 
     def _object(self, response: httpx.Response) -> dict[str, Any]:
         try:
             answer = response.json()
         except ValueError as e:
-            raise ShiftError(f"what answers at {self.url} is no gateway: its answer is no JSON") from e
+            raise self._stranger(f"it answered with {_kind_of(response)}") from e
         if not isinstance(answer, dict):
-            raise ShiftError(f"what answers at {self.url} is no gateway: its answer is no JSON object")
+            raise self._stranger("its answer is not a JSON object")
         return answer
 
+    def _error_of(self, response: httpx.Response) -> ShiftError:
+        """Return the error of a problem document, and of anything else a sentence that says what answered."""
+        try:
+            document = response.json()
+            kind = str(document["type"]).rsplit(":", 1)[-1]
+            errors = tuple(FieldError(**e) for e in document.get("errors", ()))
+            return Problem(kind=kind, detail=document["detail"], errors=errors).error()
+        except (ValueError, KeyError, TypeError, AttributeError):
+            asked = f"{response.request.method} {response.request.url.path}"
+            status = f"{response.status_code} {response.reason_phrase}".strip()
+            return self._stranger(f"it answered {asked} with {status} and {_kind_of(response)}")
 
-def _error_of(response: httpx.Response) -> ShiftError:
+    def _stranger(self, why: str) -> ShiftError:
+        return ShiftError(f"what answers at {self.url} is not a SHIFT gateway: {why}. Is the URL the gateway's?")
+
+
+def _path(session: str, tail: str = "") -> str:
+    """Return the path of a session. Raises :class:`MalformedMessage` where ``session`` is not an id."""
+    check_id("session", session)
+    return f"/v1/sessions/{session}{tail}"
+
+
+def _json(body: Any) -> bytes:
     try:
-        document = response.json()
-        kind = str(document["type"]).rsplit(":", 1)[-1]
-        errors = tuple(FieldError(**e) for e in document.get("errors", ()))
-        return Problem(kind=kind, detail=document["detail"], errors=errors).error()
-    except (ValueError, KeyError, TypeError):
-        return ShiftError(f"the gateway answered {response.status_code} without saying why")
+        return json.dumps(body, ensure_ascii=False, allow_nan=False).encode()
+    except (TypeError, ValueError, RecursionError) as e:
+        raise MalformedMessage(f"this cannot be sent as JSON: {e}; give plain numbers, text, lists and objects") from e
+
+
+def _kind_of(response: httpx.Response) -> str:
+    kind = response.headers.get("Content-Type", "").partition(";")[0]
+    return shorten(kind) if response.content and kind else "something" if response.content else "an empty body"

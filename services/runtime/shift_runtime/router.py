@@ -11,7 +11,9 @@ import sys
 import threading
 
 import zenoh
+from shift_schemas.errors import InvalidSettings
 
+from shift_runtime.endpoints import parse_endpoint
 from shift_runtime.settings import DEFAULT_ROUTER
 from shift_runtime.zenoh_config import zenoh_config
 
@@ -23,9 +25,15 @@ def main() -> None:
         signal.signal(number, lambda *_: stop.set())
     listen = os.environ.get("SHIFT_ROUTER_LISTEN", DEFAULT_ROUTER)
     try:
+        parse_endpoint(listen, "SHIFT_ROUTER_LISTEN")
+    except InvalidSettings as e:
+        sys.stderr.write(f"shift_router: {e.detail}\n")
+        sys.exit(2)
+    try:
         session = zenoh.open(zenoh_config("router", listen=listen))
     except zenoh.ZError as e:
-        sys.exit(f"the router cannot listen on {listen}: {e}; is another one running? set SHIFT_ROUTER_LISTEN")
+        todo = "if another router runs there, stop it, or set SHIFT_ROUTER_LISTEN to another endpoint"
+        sys.exit(f"the router cannot listen on {listen}: {e}; {todo}")
     print(f"router listens on {listen}", file=sys.stderr, flush=True)
     while not stop.wait(0.5):
         pass

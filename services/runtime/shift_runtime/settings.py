@@ -3,12 +3,40 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from shift_schemas.errors import InvalidSettings, field_errors
+from shift_schemas.hints import did_you_mean
+
+from shift_runtime.endpoints import parse_endpoint
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
+LOG_LEVELS = ("debug", "info", "warning", "error")
+_OTHER_NAMES = {"warn": "warning", "fatal": "error", "critical": "error"}
+"""What ROS 2 and Python's logging call them."""
+
+
+def _log_level(value: object) -> object:
+    name = value.strip().lower() if isinstance(value, str) else value
+    level = _OTHER_NAMES.get(name, name) if isinstance(name, str) else name
+    if level not in LOG_LEVELS:
+        raise ValueError(f"write one of {', '.join(LOG_LEVELS)}{did_you_mean(value, LOG_LEVELS)}")
+    return level
+
+
+def _endpoint(text: str) -> str:
+    if text:
+        try:
+            parse_endpoint(text)
+        except InvalidSettings as e:
+            raise ValueError(e.detail.partition(": ")[2]) from e
+    return text
+
+
+LogLevel = Annotated[Literal["debug", "info", "warning", "error"], BeforeValidator(_log_level)]
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
 
 
 class MeshSettings(BaseSettings):
@@ -16,21 +44,23 @@ class MeshSettings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="SHIFT_", frozen=True, extra="ignore")
 
-    zenoh: str = Field(default=DEFAULT_ROUTER, description="Endpoint of the router that the mesh meets at.")
-    listen: str = Field(
+    zenoh: Endpoint = Field(default=DEFAULT_ROUTER, description="Endpoint of the router that the mesh meets at.")
+    listen: Endpoint = Field(
         default="tcp/127.0.0.1:0",
         description="Where this process takes direct links of its peers; empty: everything goes by the router.",
     )
     data: Path = Field(default=Path("data"), description="Folder of recordings, studies and journals.")
-    log_level: str = Field(default="info", description="debug, info, warning or error.")
+    log_level: LogLevel = Field(default="info", description="debug, info, warning or error.")
     log_json: bool = Field(default=False, description="Logs as JSON lines.")
 
 
 def read_settings(kind: type[MeshSettings] = MeshSettings, **given: object) -> MeshSettings:
-    """The settings, with ``given`` (flags) above the environment. Raises :class:`InvalidSettings`."""
+    """Return the settings; ``given`` (flags) comes before the environment. Raises :class:`InvalidSettings`."""
     try:
         return kind(**{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
     except ValidationError as e:
         errors = field_errors(e)
-        said = "; ".join(f"SHIFT_{f.field.upper()} is {f.value!r}: {f.rule}" for f in errors)
+        said = "; ".join(
+            f"SHIFT_{f.field.upper()} is {f.value!r}: {f.rule.removeprefix('Value error, ')}" for f in errors
+        )
         raise InvalidSettings(said, errors) from e

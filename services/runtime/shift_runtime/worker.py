@@ -18,7 +18,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import structlog
 from shift_schemas.codec import decode, encode, encode_answer, encoding_of
-from shift_schemas.errors import Conflict, MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
+from shift_schemas.errors import MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
 from shift_schemas.keys import (
     PROCEDURES,
     ROOT,
@@ -41,13 +41,14 @@ from shift_schemas.messages import (
     OutboxRow,
     Session,
 )
+from shift_schemas.repeats import repeat_conflict
 from shift_schemas.stamps import Stamp
 from shift_schemas.step import NotYet, Step
 
 from shift_runtime.bus import Bus, Incoming, Request
 from shift_runtime.claim import Claim
 from shift_runtime.clock import Clock
-from shift_runtime.journal import AnswerKey, Batch, Journal, StoredAnswer, digest_of
+from shift_runtime.journal import AnswerKey, Batch, Journal, StoredAnswer, same_content
 from shift_runtime.metrics import Metrics
 from shift_runtime.reader import Reader, ReadFact
 
@@ -302,7 +303,7 @@ class Worker(Generic[S]):
         try:
             key = parse_key(request.key)
             if not isinstance(key, CommandKey):
-                raise MalformedMessage(f"{request.key} is no command's key")
+                raise MalformedMessage(f"{request.key} is not the key of a command")
             command = decode(COMMANDS[key.procedure], request.payload)
             if command.session != key.session:
                 raise MalformedMessage(f"a command for session {command.session} under session {key.session}")
@@ -330,7 +331,7 @@ class Worker(Generic[S]):
     def _chunk(self, text: str, payload: bytes) -> tuple[str, GazeChunk]:
         key = parse_key(text)
         if not isinstance(key, StreamKey):
-            raise MalformedMessage(f"{text} is no stream's key")
+            raise MalformedMessage(f"{text} is not the key of a stream")
         return key.session, decode(GazeChunk, payload)
 
     def _drop(self, request: Request, error: MalformedMessage) -> None:
@@ -425,7 +426,8 @@ class Worker(Generic[S]):
             self._refuse(turn, asked, e)
         except Exception as e:  # a mistake of ours: it must not end the service for everybody else
             log.exception("a command failed", procedure=asked.procedure, session=asked.session)
-            self._refuse(turn, asked, ShiftError(f"the {self.core.name} failed at it: {type(e).__name__}; see its log"))
+            why = f"because of a mistake of its own ({type(e).__name__}); see its log"
+            self._refuse(turn, asked, ShiftError(f"the {self.core.name} could not do this {why}"))
         else:
             self._take(turn, asked.session, step)
             self._keep(turn, asked, step)
@@ -436,8 +438,8 @@ class Worker(Generic[S]):
         stored = turn.batch.answers.get(asked.key) or self.journal.answer(asked.key)
         if stored is None:
             return None
-        if stored.digest != digest_of(asked.message.content()):
-            raise Conflict(f"{asked.procedure} {asked.message.command_id} was asked before with another content")
+        if not same_content(stored.content, asked.message.content()):
+            raise repeat_conflict(asked.message, stored.content)
         return stored.result
 
     def _keep(self, turn: _Turn, asked: Asked, step: Step[S]) -> None:
@@ -447,7 +449,7 @@ class Worker(Generic[S]):
         else:
             result, seq = json.dumps(step.result), 0
         if asked.key is not None and isinstance(asked.message, Command):
-            turn.batch.answers[asked.key] = StoredAnswer(digest_of(asked.message.content()), result, seq)
+            turn.batch.answers[asked.key] = StoredAnswer(asked.message.content(), result, seq)
         turn.answers.append((asked, _Told(result, self._head(turn, asked.session), step.repeat)))
 
     def _refuse(self, turn: _Turn, asked: Asked, error: ShiftError) -> None:

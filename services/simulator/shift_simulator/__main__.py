@@ -9,6 +9,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
+from typing import Literal
 
 import structlog
 from pydantic import Field
@@ -29,7 +30,7 @@ class DemoSettings(MeshSettings):
     url: str = Field(default="http://127.0.0.1:8080", description="The gateway.")
     demo: bool = Field(default=True, description="Whether there is a simulated person at all.")
     demo_every_s: float = Field(default=2.0, gt=0, le=3600, description="Seconds between interactions.")
-    demo_user: str = Field(default="B", description="Which of the paper's users: A, B, C or D.")
+    demo_user: Literal["A", "B", "C", "D"] = Field(default="B", description="Which of the paper's users: A, B, C or D.")
 
 
 def main() -> None:
@@ -44,10 +45,11 @@ def main() -> None:
         if settings.demo:
             _live(settings, stop)
         else:
-            log.info("no simulated person is wanted")
+            log.info("the simulated person is switched off by SHIFT_DEMO")
             stop.wait()
     except ShiftError as e:
-        sys.exit(f"shift_simulator: {e.detail}")
+        sys.stderr.write(f"shift_simulator: {e.detail}\n")
+        sys.exit(2)
 
 
 def _live(settings: DemoSettings, stop: threading.Event) -> None:
@@ -56,8 +58,10 @@ def _live(settings: DemoSettings, stop: threading.Event) -> None:
         session = "demo" if number == 1 else f"demo-{number}"
         try:
             with RestClient(settings.url, patience_s=5.0) as shift:
-                shift.start("P00", session=session, study="default")
-                log.info("a simulated person is here", session=session, user=settings.demo_user)
+                if shift.start("P00", session=session, study="default")["state"] != "live":
+                    number += 1
+                    continue
+                log.info("the simulated person begins", session=session, user=settings.demo_user)
                 for _ in drive(shift, session, paper_user(settings.demo_user), 1_000_000):
                     if stop.wait(settings.demo_every_s):
                         return

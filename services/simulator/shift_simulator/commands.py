@@ -7,6 +7,7 @@ codes: 0 fine, 1 the criterion does not hold, 2 wrong use.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,8 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+
+from shift_simulator.options import LEARNER_HELP, USER_HELP, USER_METAVAR, check_learner
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode="rich", help="Evaluate the model with simulated users."
@@ -36,6 +39,7 @@ def table2(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fa
     from shift_simulator import report
     from shift_simulator import table2 as experiment
 
+    _make_folder(out)
     with _progress("twelve rows"):
         result = experiment.table2(seed, runs)
     _put_out("table2", result, out, as_json, report.print_table2)
@@ -52,6 +56,7 @@ def users(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fal
     """
     from shift_simulator import report, user_study
 
+    _make_folder(out)
     with _progress("users A to D"):
         result = user_study.users(seed, runs)
     if out is not None:
@@ -63,11 +68,12 @@ def users(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fal
 @app.command()
 def learners(
     learner: Annotated[
-        list[str] | None, typer.Option(help="A learner's name; repeatable. Left out: all.", envvar="SHIFT_LEARNER")
+        list[str] | None,
+        typer.Option(help=f"{LEARNER_HELP} Repeatable; left out: all.", envvar="SHIFT_LEARNER", callback=check_learner),
     ] = None,
     user: Annotated[
         list[str] | None,
-        typer.Option(help="A, B, C, D or a user file; repeatable. Left out: A to D.", envvar="SHIFT_USER"),
+        typer.Option(help=f"{USER_HELP} Repeatable; left out: A to D.", envvar="SHIFT_USER", metavar=USER_METAVAR),
     ] = None,
     runs: Runs = 200,
     seed: Seed = 0,
@@ -81,14 +87,16 @@ def learners(
 
     \b
     shift-mesh evaluate learners --regret
-    shift-mesh evaluate learners --learner planner --learner q-learning --user my-user.json --json
+    shift-mesh evaluate learners --learner planner --learner q-learning --user docs/examples/my-user.json --json
     """
-    from shift_learner.learners import LEARNERS, learner_named
+    from shift_learner.learners import LEARNERS
 
     from shift_simulator import compare, report
+    from shift_simulator.user_files import user_named
 
-    names = [learner_named(name).name for name in learner or LEARNERS]
-    people = [_user(name) for name in user or ("A", "B", "C", "D")]
+    names = learner or list(LEARNERS)
+    people = [user_named(name) for name in user or ("A", "B", "C", "D")]
+    _make_folder(out)
     with _progress("learners") as said:
         result = compare.compare(names, people, seed, runs, regret, said)
     if out is not None:
@@ -96,17 +104,18 @@ def learners(
     _put_out("learners", result, out, as_json, report.print_learners)
 
 
-def _user(name: str) -> Any:
+def _make_folder(out: Path | None) -> None:
+    """Make the folder for the results before anything is computed, so that a wrong path costs no waiting."""
+    if out is None:
+        return
     from shift_schemas.errors import InvalidSettings
 
-    from shift_simulator.users import PAPER_USERS, paper_user, parse_user
-
-    if name in PAPER_USERS:
-        return paper_user(name)
     try:
-        return parse_user(Path(name).read_text(encoding="utf-8"), name)
-    except (OSError, UnicodeDecodeError) as e:
-        raise InvalidSettings(f"{name} is none of {', '.join(PAPER_USERS)} and no readable user file: {e}") from e
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as e:
+        raise InvalidSettings(f"--out is {out}: this folder cannot be made: {e.strerror}; give another one") from e
+    if not os.access(out, os.W_OK):
+        raise InvalidSettings(f"--out is {out}: this folder cannot be written; give another one")
 
 
 @contextmanager
@@ -120,7 +129,6 @@ def _put_out(
     name: str, result: dict[str, Any], out: Path | None, as_json: bool, show: Callable[[dict[str, Any], Console], None]
 ) -> None:
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
         (out / f"{name}.json").write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     if as_json:
         typer.echo(json.dumps(result))

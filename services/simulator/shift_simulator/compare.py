@@ -19,6 +19,8 @@ from shift_simulator.user_study import crossing
 from shift_simulator.users import User
 
 Progress = Callable[[str], None]
+INTERVAL = 1.96
+"""Standard errors on either side of a mean: 95 % of a normal distribution."""
 
 
 def compare(
@@ -27,7 +29,9 @@ def compare(
     """Every learner on every user, all on the same sessions (INTERFACE.md, "Command line").
 
     ``regret_mean`` is the exact optimum of the user (``optimum``) less the mean reward, else None; its standard
-    error is the reward's. ``curves`` holds the mean cumulative reward after each episode.
+    error is the reward's. ``reward_low`` and ``reward_high`` are the 10th and the 90th percentile of the runs.
+    ``curves`` holds the mean cumulative reward after each episode, and ``low`` and ``high``, the ends of its 95 %
+    interval.
     """
     results, curves = [], []
     for user in people:
@@ -36,7 +40,7 @@ def compare(
             said(f"{name} with user {user.user}")
             cumulative = rewards_of(name, user, seed, runs)
             results.append({"learner": name, "user": user.user} | _summary(cumulative, best))
-            curves.append({"learner": name, "user": user.user, "mean": cumulative.mean(axis=1).tolist()})
+            curves.append({"learner": name, "user": user.user} | _curve(cumulative))
     return {"seed": seed, "runs": runs, "results": results, "curves": curves}
 
 
@@ -52,6 +56,8 @@ def _summary(cumulative: Floats, best: float | None) -> dict[str, Any]:
     return {
         "reward_mean": float(reward.mean()),
         "reward_se": _error(reward),
+        "reward_low": float(np.percentile(reward, 10)),
+        "reward_high": float(np.percentile(reward, 90)),
         "break_even": crossing(cumulative),
         "regret_mean": None if best is None else best - float(reward.mean()),
         "worst_dip": float(dip.mean()),
@@ -63,18 +69,51 @@ def _error(values: Floats) -> float:
     return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
 
 
-def draw_learners(result: dict[str, Any], out_dir: Path) -> list[Path]:
-    """The figure: one panel per user, mean cumulative reward of each learner, as PNG and SVG."""
-    from shift_simulator.figures import panels, saved
+def _curve(cumulative: Floats) -> dict[str, Any]:
+    mean = cumulative.mean(axis=1)
+    half = INTERVAL * np.array([_error(values) for values in cumulative])
+    return {"mean": mean.tolist(), "low": (mean - half).tolist(), "high": (mean + half).tolist()}
 
-    names = list(dict.fromkeys(c["user"] for c in result["curves"]))
-    figure, axes = panels(len(names), height=3.6)
-    for name, ax in zip(names, axes, strict=True):
-        for curve in (c for c in result["curves"] if c["user"] == name):
-            ax.plot(np.arange(1, len(curve["mean"]) + 1), curve["mean"], label=curve["learner"], linewidth=1.2)
-        ax.axhline(0, color="black", linewidth=0.7)
-        ax.set_title(f"User {name}")
-        ax.set_xlabel("episode")
-    axes[0].set_ylabel("mean cumulative reward")
-    axes[0].legend(frameon=False, loc="upper left", fontsize=7)
+
+def draw_learners(result: dict[str, Any], out_dir: Path) -> list[Path]:
+    """Draw two panels per user, as PNG and SVG: the mean curves, and the final rewards with the spread of the runs.
+
+    Learners that do alike coincide in the first; in the second each has a line of its own.
+    """
+    from shift_simulator.figures import STYLES, draw_curve, finish, label_panels, on_one_scale, panels, saved
+
+    users = list(dict.fromkeys(c["user"] for c in result["curves"]))
+    learners = list(dict.fromkeys(c["learner"] for c in result["curves"]))
+    figure, (over_time, at_the_end) = panels(len(users), 1.9, 1.45)
+    on_one_scale(at_the_end)
+    for user, above, below in zip(users, over_time, at_the_end, strict=True):
+        for curve in (c for c in result["curves"] if c["user"] == user):
+            turn = learners.index(curve["learner"])
+            draw_curve(above, curve, STYLES[turn % len(STYLES)], turn, len(learners), curve["learner"])
+        for row in (r for r in result["results"] if r["user"] == user):
+            turn = learners.index(row["learner"])
+            _draw_end(below, row, STYLES[turn % len(STYLES)], turn)
+        above.axhline(0, color="black", linewidth=0.5)
+        below.axvline(0, color="black", linewidth=0.5)
+    at_the_end[0].set_yticks(range(len(learners)), learners)
+    at_the_end[0].set_ylim(len(learners) - 0.5, -0.5)
+    episodes = len(result["curves"][0]["mean"])
+    label_panels(over_time, users, "episode", "cumulative reward")
+    label_panels(at_the_end, users, f"reward after {episodes}", "")
+    finish(
+        figure,
+        over_time[0],
+        f"Means of n = {result['runs']} simulated runs (seed {result['seed']}). Above, over time, each user on a scale "
+        f"of its own; band: 95 % interval of the mean (± {INTERVAL} standard errors). Below: reward after {episodes} "
+        "episodes; bar: the middle 80 % of the runs (10th to 90th percentile).",
+    )
     return saved(figure, out_dir, "learners")
+
+
+def _draw_end(ax: Any, row: dict[str, Any], style: Any, place: int) -> None:
+    mean, low, high = (row[name] for name in ("reward_mean", "reward_low", "reward_high"))
+    ax.hlines(place, low, high, color=style.colour, linewidth=1.2)
+    ax.plot(
+        mean, place, color=style.colour, marker=style.marker, linestyle="none",
+        markerfacecolor="white" if style.marker != "x" else None,
+    )  # fmt: skip

@@ -165,4 +165,4 @@ def check_simulable(study: Study) -> None:
     if len(study.scoring.actions) != ACTIONS:
         raise InvalidSettings(f"simulated users know {ACTIONS} actions; the study has {len(study.scoring.actions)}")
     if study.awareness.window != 1 or study.awareness.threshold == 0:
-        raise InvalidSettings("many runs at once follow awareness with window 1 and a threshold above 0 only")
+        raise InvalidSettings("simulating many runs at once needs awareness.window 1 and awareness.threshold above 0")

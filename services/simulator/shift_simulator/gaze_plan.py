@@ -84,8 +84,8 @@ def _searched(study: Study, start: Attention, wanted: GazeClass) -> tuple[Look, 
                 if gaze_class(attention, study.attention) == wanted:
                     return looks
     raise InvalidSettings(
-        f"no gaze on the {len(aois)} AOIs of study {study.study} makes the gaze class {wanted} "
-        f"with its attention settings"
+        f"with the attention settings of study {study.study}, no gaze on its {len(aois)} AOIs brings about the gaze "
+        f"class {wanted}; change attention, or give the study two AOIs or more"
     )
 
 

@@ -50,7 +50,7 @@ def optimum(user: User, study: Study, episodes: int) -> float:
     batteries = _batteries(user, study)
     counts = _counts(user.tasks)
     if len(batteries.after) * len(GAZES) * len(counts) > MOST_STATES:
-        raise InvalidSettings(f"user {user.user} has too many states for the exact optimum; ask without --regret")
+        raise InvalidSettings(f"user {user.user} has too many states for the exact optimum; leave out --regret")
     scale = float(rewards(study.reward)[1].mean())
     value = np.zeros((len(batteries.after), len(GAZES), len(counts)))
     for n in range(episodes, 0, -1):
@@ -120,7 +120,7 @@ def _batteries(user: User, study: Study) -> Batteries:
             row.append(found[key])
         after.append(row)
         if len(found) > MOST_STATES // len(GAZES):
-            raise InvalidSettings(f"user {user.user} has too many capacities for the exact optimum")
+            raise InvalidSettings(f"user {user.user} has too many capacities for the exact optimum; leave out --regret")
     high = [np.array([int(k[i] >= s.threshold - MARGIN) for k in queue]) for i, s in enumerate(both)]
     return Batteries(np.array(after), high[0], high[1])
 

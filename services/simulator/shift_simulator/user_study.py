@@ -64,20 +64,23 @@ def _curve(cumulative: Floats) -> dict[str, Any]:
 
 
 def draw_users(result: dict[str, Any], out_dir: Path) -> list[Path]:
-    """The figure: one panel per user, cumulative reward with and without the prior, as PNG and SVG."""
-    from shift_simulator.figures import panels, saved
+    """Draw a panel per user, cumulative reward with and without the prior, as PNG and SVG."""
+    from shift_simulator.figures import STYLES, draw_curve, finish, label_panels, on_one_scale, panels, saved
 
     names = list(dict.fromkeys(c["user"] for c in result["curves"]))
-    figure, axes = panels(len(names))
+    figure, (axes,) = panels(len(names), 1.6)
+    on_one_scale(axes)
     for name, ax in zip(names, axes, strict=True):
         for curve in (c for c in result["curves"] if c["user"] == name):
-            label, colour = ("scoring prior", "#0072B2") if curve["prior"] else ("no prior", "#D55E00")
-            episodes = np.arange(1, len(curve["mean"]) + 1)
-            ax.plot(episodes, curve["mean"], color=colour, label=label)
-            ax.fill_between(episodes, curve["low"], curve["high"], color=colour, alpha=0.15, linewidth=0)
-        ax.axhline(0, color="black", linewidth=0.7)
-        ax.set_title(f"User {name}")
-        ax.set_xlabel("episode")
-    axes[0].set_ylabel("cumulative reward")
-    axes[0].legend(frameon=False, loc="upper left")
+            turn, label = (0, "with scoring prior") if curve["prior"] else (1, "without prior")
+            draw_curve(ax, curve, STYLES[turn], turn, 2, label)
+        ax.axhline(0, color="black", linewidth=0.5)
+    label_panels(axes, names, "episode", "cumulative reward")
+    runs, seed = result["runs"], result["seed"]
+    finish(
+        figure,
+        axes[0],
+        f"Line: mean of n = {runs} simulated runs (seed {seed}). Band: the middle 80 % of the runs (10th to 90th "
+        "percentile).",
+    )
     return saved(figure, out_dir, "users")

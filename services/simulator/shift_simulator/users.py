@@ -98,7 +98,7 @@ def true_capacity(user: User, study: Study) -> CapacitySettings:
 def paper_user(name: str) -> User:
     """User A, B, C or D of the paper (section V-B), each a function of the one before."""
     if name not in PAPER_USERS:
-        raise InvalidSettings(f"there is no built-in user {shorten(name)!r}; there are {', '.join(PAPER_USERS)}")
+        raise InvalidSettings(f"there is no built-in user {shorten(name)!r}; write one of {', '.join(PAPER_USERS)}")
     suggested = suggestions(ScoringSettings.model_validate({}))
     table = [
         [float(_succeeds(name, triple, action, action == suggested[i])) for action in range(ACTIONS)]
@@ -148,7 +148,7 @@ def _said(error: ValidationError) -> str:
 
 
 def _no_constant(text: str) -> Any:
-    raise ValueError(f"{text} is not a number that JSON knows")
+    raise ValueError(f"{text} is not a number in JSON; write a number")
 
 
 def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -1,0 +1,38 @@
+"""A simulated user by the name that a person writes: one of the paper's, or the path of a user file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shift_schemas.errors import InvalidSettings, shorten
+from shift_schemas.hints import did_you_mean
+
+from shift_simulator.users import PAPER_USERS, User, paper_user, parse_user
+
+
+def user_named(name: str) -> User:
+    """Return user A, B, C or D of the paper, or the user of the file ``name``.
+
+    Raises
+    ------
+    InvalidSettings
+        There is no such user and no such file, the file cannot be read, or it has a mistake.
+    """
+    return paper_user(name) if name in PAPER_USERS else parse_user(_text_of(name), name)
+
+
+def _text_of(name: str) -> str:
+    try:
+        return Path(name).read_text(encoding="utf-8-sig")
+    except FileNotFoundError as e:
+        known = ", ".join(PAPER_USERS)
+        meant = did_you_mean(name, PAPER_USERS)
+        raise InvalidSettings(
+            f"there is no simulated user {shorten(name)!r}, and no file of that name; "
+            f"write {known} or the path of a user file{meant}"
+        ) from e
+    except UnicodeDecodeError as e:
+        raise InvalidSettings(f"{name} is not text in UTF-8, so it is not a user file; give one in JSON") from e
+    except (OSError, ValueError) as e:  # a folder, no permission, a null character in the name
+        why = e.strerror if isinstance(e, OSError) else e
+        raise InvalidSettings(f"the user file {shorten(name)} cannot be read: {why}") from e
