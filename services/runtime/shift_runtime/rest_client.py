@@ -21,13 +21,14 @@ from types import TracebackType
 from typing import Any
 
 import httpx
-from shift_schemas.errors import check_id, (
+from shift_schemas.errors import (
     FieldError,
     InvalidSettings,
     MalformedMessage,
     Problem,
     ShiftError,
     Unavailable,
+    check_id,
     shorten,
 )
 from shift_schemas.messages import GazeChunk
