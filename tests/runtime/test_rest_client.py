@@ -178,7 +178,7 @@ def test_a_session_that_is_not_an_id_never_becomes_another_path(
         lambda: shift.gaze(session, GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["cup"])),
     )
     for ask in asking:
-        with pytest.raises(MalformedMessage, match="an id is 1 to 63 letters") as found:
+        with pytest.raises(MalformedMessage, match="is not an id: 1 to 63 letters") as found:
             ask()
         assert found.value.errors[0].field == "session"
     assert gateway.asked == []

@@ -26,7 +26,7 @@ CONFIG_METADATA = "shift:config"
 
 
 def library() -> str:
-    """``shift-mesh/0.1.0``."""
+    """``shift-mesh/0.2.0``."""
     try:
         return f"shift-mesh/{version('shift-mesh')}"
     except PackageNotFoundError:
