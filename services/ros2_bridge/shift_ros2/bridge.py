@@ -13,7 +13,7 @@ from functools import partial
 
 import structlog
 from shift_runtime.clock import Clock
-from shift_runtime.door import READ_WAIT_S, CommandDoor
+from shift_runtime.door import READ_WAIT_S, CommandDoor, new_id
 from shift_runtime.metrics import Metrics
 from shift_schemas.bodies import MarkerBody, StartBody
 from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
@@ -165,7 +165,8 @@ class Bridge:
 
     def _mark(self, text: str | None) -> None:
         if text is not None:
-            self._reports.put("ros4hri", partial(self.door.mark, self.session, MarkerBody(text=text)))
+            body = MarkerBody(text=text, marker_id=new_id("m-"))  # one id, however often it is sent
+            self._reports.put("ros4hri", partial(self.door.mark, self.session, body))
 
     # --- out ---
 
