@@ -20,7 +20,7 @@ REQUIREMENTS: dict[str, tuple[str, ...]] = {
     # ROS 2 Kilted with FastDDS; and what the bridge itself needs, as it runs there with backend rclpy
     "rclpy": (
         "ros-rclpy[fastrtps]==9.1.2", "ros-std-msgs", "ros-std-srvs",
-        "eclipse-zenoh>=1.10,<2", "pydantic>=2.12,<3", "pydantic-settings>=2.10,<3", "PyYAML>=6.0.2",
+        "eclipse-zenoh>=1.10,<2", "pydantic>=2.12,<3", "pydantic-settings>=2.10,<3", "ruamel.yaml>=0.18",
         "structlog>=25", "prometheus-client>=0.22", "uvloop>=0.22",
     ),
 }  # fmt: skip
