@@ -100,4 +100,4 @@ def late_warning(seq: int, last: int) -> str:
 
 
 def _s(ns: int) -> str:
-    return f"{ns / NS:.6g}"
+    return f"{ns / NS:.9f}".rstrip("0").rstrip(".")
