@@ -36,6 +36,8 @@ def test_a_damaged_recording_is_not_verified(tmp_path: Path, kind: str) -> None:
     changed.with_name("points.mcap.sha256").unlink()
     code, line = last_line("verify", str(changed))
     assert line.startswith("NOT VERIFIED: " if code else "VERIFIED")
+    assert code == 1 or kind != "empty"
+    assert CliRunner().invoke(app, ["info", str(changed)]).exit_code == (0 if kind == "cut" else 1)
 
 
 def test_info_counts_the_samples_beside_the_chunks_and_takes_the_sessions_own_times() -> None:

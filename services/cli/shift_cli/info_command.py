@@ -18,7 +18,7 @@ def info(
 ) -> None:
     """Show whose recording it is, how long, how many messages of what, and whether it is whole.
 
-    Exit code 1 where it is damaged or is not what its checksum says.
+    Exit code 1 where it is damaged, holds no messages or is not what its checksum says.
 
     \b
     shift-mesh info data/recordings/s1.mcap
@@ -36,7 +36,7 @@ def info(
         console = Console()
         console.print(_about(found))
         console.print(_counts(found))
-    raise typer.Exit(1 if found.damaged or found.checksum == "differs" else 0)
+    raise typer.Exit(1 if found.damaged or found.checksum == "differs" or not found.counts else 0)
 
 
 def _about(found: RecordingInfo) -> Table:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from shift_schemas.keys import SUBJECTS
 
 if TYPE_CHECKING:
     from shift_recorder.replay import Extent, Pacer, Publish, Replay
@@ -27,7 +28,9 @@ def replay(
     longest_pause: Annotated[
         float, typer.Option(help="Shorten longer pauses to so many seconds; 0: none.", envvar="SHIFT_LONGEST_PAUSE")
     ] = 10.0,
-    topics: Annotated[str, typer.Option(help="Only these, with commas between.", envvar="SHIFT_TOPICS")] = "",
+    topics: Annotated[
+        str, typer.Option(help=f"Only these, with commas between: {', '.join(SUBJECTS)}.", envvar="SHIFT_TOPICS")
+    ] = "",
     start_paused: Annotated[
         bool, typer.Option("--start-paused", help="Wait for Enter.", envvar="SHIFT_START_PAUSED")
     ] = False,
@@ -52,7 +55,6 @@ def replay(
 
     from shift_recorder.replay import Replay, extent_of, replay_session
     from shift_schemas.errors import Conflict
-    from shift_schemas.keys import SUBJECTS
 
     extent = extent_of(file, longest_pause)
     wanted = tuple(name.strip() for name in topics.split(",") if name.strip()) or SUBJECTS

@@ -18,6 +18,7 @@ from shift_runtime.bus import Bus
 from shift_runtime.reader import REPLAY_MARK
 from shift_schemas.codec import decode, encode, encoding_of
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, shorten
+from shift_schemas.hints import did_you_mean
 from shift_schemas.ids import is_id, not_an_id
 from shift_schemas.keys import SUBJECTS, FactKey, ServiceKey, build_key
 from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, Session
@@ -69,7 +70,8 @@ class Replay:
         if not 0 <= self.longest_pause_s < 1e9:
             raise MalformedMessage(f"a longest pause of {self.longest_pause_s:g} s is not valid; write 0 for no limit")
         if unknown := [topic for topic in self.topics if topic not in SUBJECTS]:
-            raise MalformedMessage(f"{shorten(unknown[0])!r} is no topic; there are {', '.join(SUBJECTS)}")
+            known = f"there are {', '.join(SUBJECTS)}{did_you_mean(unknown[0], SUBJECTS)}"
+            raise MalformedMessage(f"{shorten(unknown[0])!r} is not a topic; {known}")
 
 
 @dataclass(frozen=True)

@@ -158,6 +158,9 @@ class _Verification:
 
     def _judge_file(self) -> None:
         report = self.recording.report
+        if not self.recording.library and not any(owner.sequence for owner in self.owners.values()):
+            why = "it does not even begin as a recording does, so there is nothing to verify"
+            raise Differs(0, Difference("file", 0, "", None, None, f"{self.recording.path.name}: {why}"))
         last = [p.fact for p in self.owners["recorder"].facts if isinstance(p.fact, Session)]
         ended = bool(last) and isinstance(last[-1], Session) and last[-1].state == "ended"
         if not report.complete and CONFIG_METADATA in self.recording.metadata:
