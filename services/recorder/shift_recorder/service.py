@@ -27,7 +27,7 @@ from shift_runtime.reader import ReadFact
 from shift_runtime.settings import MeshSettings
 from shift_runtime.studies import study_to_start
 from shift_runtime.worker import Asked, Core, Worker, _Turn
-from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, Unavailable
+from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, ShiftError, Unavailable
 from shift_schemas.keys import OWNERS, READS, ROOT, FactKey, StreamKey, parse_key
 from shift_schemas.messages import END_ID, Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
 from shift_schemas.study_text import study_from_json
@@ -305,12 +305,29 @@ class RecorderWorker(Worker[RecorderState]):
         while True:
             silent = await self.reader.pull_all(("recorder", *_PEERS), session)
             behind = silent or self._behind(session)
-            if not behind:
+            misfit = "" if silent else self._misfit(session)
+            if not behind and not misfit:
                 return
             if loop.time() > deadline:
+                if misfit:
+                    raise Conflict(misfit)
                 why = "does not answer" if silent else "has not caught up"
                 raise Unavailable(f"session {session} cannot end yet: the {behind[0]} {why}; ask again")
             await asyncio.sleep(0.02)
+
+    def _misfit(self, session: str) -> str:
+        """Return a sentence where a service has read more of another one than there is: a folder that was copied."""
+        pages = {owner: self.reader.pages[f"{owner}/{session}"] for owner in ("recorder", *_PEERS)}
+        for peer in _PEERS:
+            for owner, read in pages[peer].cursors.get(session, {}).items():
+                head = pages[owner].heads.get(session, 0)
+                if read > head:
+                    return (
+                        f"session {session} cannot end: the {peer} has read {read} messages of the {owner}, whose "
+                        f"journal ends at {head}: the data folder was copied while a mesh used it; end the session on "
+                        "the original"
+                    )
+        return ""
 
     def _behind(self, session: str) -> tuple[str, ...]:
         pages = {owner: self.reader.pages[f"{owner}/{session}"] for owner in ("recorder", *_PEERS)}
