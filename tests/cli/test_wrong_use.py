@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -259,7 +260,8 @@ def test_a_session_that_is_not_an_id_is_refused_by_its_field(
 
 def test_ctrl_c_ends_a_command_without_a_traceback(stranger: ThreadingHTTPServer) -> None:
     line = [sys.executable, "-m", "shift_cli.main", "simulate", "--url", url_of(stranger)]
-    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell's background jobs do not hear it
+    process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
     assert stranger.asked.wait(60)  # type: ignore[attr-defined]
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)

@@ -136,6 +136,7 @@ def begin(mesh: LiveMesh, session: str) -> Traffic:
     httpx.post(f"{mesh.url}/v1/sessions", json=body, timeout=30.0).raise_for_status()
     traffic = Traffic(mesh, session)
     traffic.start()
+    mesh.until(lambda: traffic.reports)
     return traffic
 
 
@@ -149,7 +150,8 @@ def check(mesh: LiveMesh, traffic: Traffic) -> None:
     assert (report.ok, report.complete) == (True, True), report.difference
     facts = [recorded.fact for recorded in Recording(path).facts(("gaze", "decision", "performance"))]
     samples = sum(len(fact.t) for fact in facts if fact.subject == "gaze")  # type: ignore[attr-defined]
-    assert samples >= traffic.accepted > 0
+    assert traffic.accepted > 0
+    assert samples >= traffic.accepted
     for subject, answered in (("decision", traffic.decisions), ("performance", traffic.reports)):
         assert answered <= {fact.decision_id for fact in facts if fact.subject == subject}  # type: ignore[attr-defined]
 

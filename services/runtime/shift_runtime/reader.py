@@ -8,7 +8,7 @@ is asked to. So nothing is missed and nothing is read twice, whatever the networ
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import structlog
@@ -183,7 +183,7 @@ class Reader:
             if page is None:
                 return False
             self.links.answered(owner)
-            self._compare(owner, page, session)
+            self._compare(owner, page, cursors)
             if not self._taken(owner, page):
                 return False
             past |= {s: n for s, n in page.heads.items() if s in self.done}
@@ -194,11 +194,9 @@ class Reader:
                     self.synced.add(owner)
                 return True
 
-    def _compare(self, owner: str, page: OutboxPage, only: str | None) -> None:
+    def _compare(self, owner: str, page: OutboxPage, asked: Mapping[str, int]) -> None:
         """Notice a journal that is older than what was read of it: its folder was copied while a mesh used it."""
-        for (session, of), read in self.cursors.items():
-            if of != owner or only not in (None, session):
-                continue
+        for session, read in asked.items():  # as it was when the page was asked for: hints may have come meanwhile
             head = page.heads.get(session, 0)
             if read <= head:
                 self.misfits.pop((owner, session), None)
