@@ -298,6 +298,39 @@ async def test_what_is_taken_back_is_not_heard_nor_asked_any_more(open_bus: Open
     assert heard == []
 
 
+async def test_a_bus_that_was_opened_anew_hears_and_answers_as_before(open_bus: OpenBus) -> None:
+    one, other = await pair(open_bus)
+    heard: list[bytes] = []
+    one.subscribe("shift/v1/s1/marker", lambda incoming: heard.append(incoming.payload))
+    taken_back = one.subscribe("shift/v1/s1/marker", lambda incoming: heard.append(b"taken back"))
+    one.serve("shift/v1/s1/rpc/mark", lambda request: request.reply(b"yes"))
+    taken_back.close()
+    for _ in range(2):
+        await one.reopen()
+        await answered(other, "shift/v1/s1/rpc/mark", 1)
+        heard.clear()
+
+        async def arrived() -> bool:
+            other.put("shift/v1/s1/marker", b"hello")
+            await asyncio.sleep(0.01)
+            return bool(heard)
+
+        await until_asked(arrived)
+        assert set(heard) == {b"hello"}
+        assert one.joined
+        assert [reply.payload for reply in await one.get("shift/v1/s1/rpc/mark", timeout_s=1.0)] == [b"yes"]
+
+
+async def test_an_owner_is_found_by_the_router_as_long_as_it_is_there(router: str) -> None:
+    owner, asking = await ZenohBus.open(router, "tcp/127.0.0.1:0"), await ZenohBus.open(router, "tcp/127.0.0.1:0")
+    key = "shift/v1/@service/monitor/health"
+    owner.serve(key, lambda request: request.reply(b"{}"))
+    await until_asked(lambda: asking.answers_by_router(key))
+    await owner.close()
+    assert not await asking.answers_by_router(key)
+    await asking.close()
+
+
 async def test_a_bus_that_left_answers_nothing(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     other.serve("b", lambda r: r.reply(b"yes"))

@@ -235,10 +235,13 @@ class ZenohBus:
     async def reopen(self) -> None:
         """See :class:`~shift_runtime.bus.Bus`. The new session is there before the old one goes."""
         async with self._moving:
-            session = await _opened(self._connect, self._listen)
+            try:
+                session = await _opened(self._connect, self._listen)
+                for handle in self._handles:
+                    handle.move(session)
+            except zenoh.ZError as e:
+                raise InvalidSettings(f"SHIFT_ZENOH is {self._connect!r}, SHIFT_LISTEN is {self._listen!r}: {e}") from e
             left, self.session = self.session, session
-            for handle in self._handles:
-                handle.move(session)
             _leave(left, lambda: None)
 
     async def answers_by_router(self, key: str) -> bool:
@@ -300,5 +303,7 @@ def _answers(connect: str, key: str) -> bool:
         return False
     try:
         return any(reply.ok is not None for reply in session.get(key, timeout=BY_ROUTER_S))
+    except zenoh.ZError:
+        return False
     finally:
         _leave(session, lambda: None)
