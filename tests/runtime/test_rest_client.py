@@ -182,7 +182,7 @@ def test_a_session_that_is_not_an_id_never_becomes_another_path(
             ask()
         assert found.value.errors[0].field == "session"
     assert gateway.asked == []
-    with pytest.raises(MalformedMessage, match="write for example 'P-01'"):
+    with pytest.raises(MalformedMessage, match="for example P-01"):
         shift.end("P 01")
 
 
