@@ -40,7 +40,12 @@ def test_native_node_topics_and_service_are_in_the_graph(mesh: LiveMesh, tmp_pat
     ):
         robot.ask("service", "/lab/shift/next_strategy")
         assert robot.ask("ready", "/lab/shift/next_strategy")
-        tokens = [t.split("/") for t in robot.ask("tokens") if "/robot" in t]
+
+        def tokens_of_node() -> list[str]:
+            return [t for t in robot.ask("tokens") if "/robot" in t]
+
+        eventually(lambda: len(tokens_of_node()) >= 1 + len(INTERFACES))
+        tokens = [t.split("/") for t in tokens_of_node()]
         kinds = [(t[5], *t[9:10]) for t in tokens]
         assert kinds.count(("NN",)) == 1
         expected = {i.topic: f"%lab%shift%{i.topic}" for i in INTERFACES} | {"gaze": "%tracker%gaze"}
