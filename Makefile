@@ -41,7 +41,7 @@ bench: setup-dev                        ## Each program in benchmarks/
 	done
 
 campaign-suspend: setup-dev             ## Each process suspended under traffic, for half an hour; ARGS="--times 2"
-	@$(BIN)/python tests/faults/suspended.py $(ARGS)
+	@$(BIN)/python tests/support/suspension.py $(ARGS)
 
 image:                                  ## The container image; IMAGE=name, BASE=another Python 3.11+
 	docker build --tag $(IMAGE) --build-arg BASE=$(BASE) --file deploy/Dockerfile .

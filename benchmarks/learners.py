@@ -19,14 +19,14 @@ import time
 import numpy as np
 from shift_learner.learner import Context, Taken
 from shift_learner.learners import learner_named
-from shift_schemas.study import Study
-from shift_simulator.batch import batch_learner
+from shift_simulator.batched_learners import batch_learner
+from shift_simulator.batched_sessions import simulate
 from shift_simulator.compare import rewards_of
-from shift_simulator.deviants import FAMILIES
-from shift_simulator.draws import session_seeds
-from shift_simulator.dynamics import simulate
+from shift_simulator.generated_users import FAMILIES
 from shift_simulator.optimum import optimum
+from shift_simulator.random_streams import session_seeds
 from shift_simulator.users import PAPER_USERS, paper_user
+from shift_study.study import Study
 
 LIVE_MS, SIMULATED_MS = 2.0, 0.2
 

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import httpx
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "e2e"))
-from mesh import free_port, running_mesh
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from support.whole_mesh import free_port, running_mesh
 
 ROUNDS = 400
 BARE = """

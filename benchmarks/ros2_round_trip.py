@@ -7,7 +7,7 @@ Medians, microseconds.
 
     python benchmarks/ros2_round_trip.py [--calls 200] [--backend native|rclpy] [--pause SECONDS] [--check]
 
-For ``rclpy`` the client and the bridge run in the environment that tests/ros2/peers.py makes.
+For ``rclpy`` the client and the bridge run in the environment that tests/support/ros_environments.py makes.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ros_rig import Bridge
+    from support.ros_rig import Bridge
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "tests" / "e2e"), str(ROOT / "tests" / "ros2")]
+sys.path[:0] = [str(ROOT / "tests")]
 PAUSE_S = 0.03
 """Between measurements: a robot's calls are seconds apart, and what a decision leads to must be over."""
 LIMIT = 1.5
@@ -52,8 +52,8 @@ def main() -> None:
 
 def measure(folder: Path, backend: str, calls: int, pause_s: float, stack: ExitStack) -> dict[str, float]:
     """The medians, in microseconds, and their ratio."""
-    from mesh import running_mesh
-    from ros_rig import Bridge, rpc_peer
+    from support.ros_rig import Bridge, rpc_peer
+    from support.whole_mesh import running_mesh
 
     mesh = stack.enter_context(running_mesh(folder / "mesh"))
     bridge = stack.enter_context(Bridge(mesh.zenoh, folder, backend, task="grasp"))
@@ -84,10 +84,10 @@ def measure(folder: Path, backend: str, calls: int, pause_s: float, stack: ExitS
 @contextmanager
 def bare_server(bridge: Bridge) -> Iterator[None]:
     """A Trigger server of the client's kind with nothing behind it."""
-    from peers import python_of, work_folder
+    from support.ros_environments import python_of, work_folder
 
     kind = "pyzeros" if bridge.backend == "native" else "rclpy"
-    command = [python_of(kind), str(ROOT / "tests" / "ros2" / f"bare_{kind}.py"), bridge.router]
+    command = [python_of(kind), str(ROOT / "tests" / "support" / "ros_peers" / f"bare_{kind}.py"), bridge.router]
     server = subprocess.Popen(command, env=bridge.env, cwd=work_folder())
     try:
         yield
@@ -99,7 +99,7 @@ def bare_server(bridge: Bridge) -> Iterator[None]:
 @contextmanager
 def getter(router: str) -> Iterator[Callable[[], float]]:
     """One Zenoh request of this process to another, linked as the mesh's services are."""
-    from shift_runtime.zenoh_config import zenoh_config
+    from shift_runtime.bus.zenoh_config import zenoh_config
     from zenoh import open as open_session
 
     server = subprocess.Popen([sys.executable, str(ROOT / "tests" / "ros2" / "get_server.py"), router])

@@ -11,8 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "e2e"))
-from mesh import LiveMesh, running_mesh
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from support.whole_mesh import LiveMesh, running_mesh
 
 RUNS = 5
 SERVICES = (

@@ -17,10 +17,8 @@ import time
 from collections.abc import Callable
 from math import exp
 
-from shift_schemas.randomness import pick, uniform
-from shift_schemas.scoring import suggestions
-from shift_schemas.study import Study
-from shift_simulator.draws import (
+from shift_model.random_numbers import pick, uniform
+from shift_simulator.random_streams import (
     COIN,
     DEVIATES,
     GAZE_CLASS,
@@ -32,6 +30,8 @@ from shift_simulator.draws import (
 )
 from shift_simulator.table2 import EPISODES, PAPER, Setting, table2
 from shift_simulator.users import DURATIONS
+from shift_study.scoring import suggestions
+from shift_study.study import Study
 
 RUNS = 500
 LOOPED = 10

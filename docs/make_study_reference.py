@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from shift_schemas.study import (
+from shift_study.study import (
     AttentionSettings,
     AwarenessSettings,
     CapacitySettings,

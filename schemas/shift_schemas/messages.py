@@ -10,10 +10,10 @@ from math import isfinite
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass, LearnerName, PolicySource
 
 from shift_schemas.ids import Id
-from shift_schemas.stamps import Stamp
-from shift_schemas.words import AwarenessClass, CapacityClass, GazeClass, LearnerName, PolicySource
+from shift_schemas.timestamps import Stamp
 
 Strategy = dict[str, str]
 Count = Annotated[int, Field(ge=0, le=2**53)]

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from shift_cli.main import app
-from shift_schemas.study_text import parse_study, study_data
+from shift_study.loading import parse_study, study_data
 from typer.testing import CliRunner, Result
 
 RUNNER = CliRunner()

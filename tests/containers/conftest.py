@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from container_stack import Stack, why_no_engine
+from support.container_stack import Stack, why_no_engine
 
 
 @pytest.fixture(scope="session")

@@ -10,8 +10,8 @@ from typing import Any
 
 import httpx
 import pytest
-from container_stack import SERVICES, Stack
 from mcap.reader import make_reader
+from support.container_stack import SERVICES, Stack
 
 pytestmark = [pytest.mark.containers, pytest.mark.timeout(1200)]
 

@@ -10,6 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_decider import core
 from shift_decider.core import ANY_TASK, DeciderState, Lacks, decided, lacks
+from shift_model.random_numbers import pick, uniform
+from shift_model.vocabulary import TRIPLES, Triple
+from shift_schemas.core_protocol import NotYet, Step
 from shift_schemas.errors import Conflict, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import (
     AwarenessView,
@@ -28,13 +31,10 @@ from shift_schemas.messages import (
     Session,
     SetOverride,
 )
-from shift_schemas.randomness import pick, uniform
-from shift_schemas.scoring import reduce
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet, Step
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_json, study_of
-from shift_schemas.words import TRIPLES, Triple
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import study_json, study_of
+from shift_study.scoring import reduce
+from shift_study.study import Study
 
 NOW = Stamp(sec=1_700_000_000, nsec=0)
 SCORING = Study(study="x").scoring

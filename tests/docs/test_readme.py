@@ -11,7 +11,7 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from mesh import LiveMesh, running_mesh
+from support.whole_mesh import LiveMesh, running_mesh
 
 ROOT = Path(__file__).resolve().parents[2]
 TOUR = re.compile(r"<!-- tour -->\n```sh\n(.*?)```", re.DOTALL)

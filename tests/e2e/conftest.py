@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from mesh import LiveMesh, running_mesh
+from support.whole_mesh import LiveMesh, running_mesh
 
 
 @pytest.fixture(scope="module")

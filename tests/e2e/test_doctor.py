@@ -13,7 +13,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
-from mesh import LiveMesh, free_port
+from support.whole_mesh import LiveMesh, free_port
 
 SERVICES = {"recorder", "monitor", "decider", "learner", "gateway"}
 

@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from interactions import read_recording
-from mesh import LiveMesh
 from shift_runtime.rest_client import RestClient
+from support.interactions import read_recording
+from support.whole_mesh import LiveMesh
 
 GAZE = Path(__file__).parents[1] / "data" / "gaze"
 FILES = sorted(GAZE.glob("*.tsv.gz"))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from interactions import check_recording, essences, expected, interact
-from mesh import LiveMesh
+from support.interactions import check_recording, essences, expected, interact
+from support.whole_mesh import LiveMesh
 
 PACKAGES = ("monitor", "decider", "learner", "recorder", "gateway", "runtime.router")
 KILLED_AT = (20, 40, 60)

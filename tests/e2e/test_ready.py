@@ -8,7 +8,7 @@ import time
 
 import httpx
 import pytest
-from mesh import LiveMesh
+from support.whole_mesh import LiveMesh
 
 SERVICES = ("recorder", "monitor", "decider", "learner")
 WITHIN_S = 5.0

@@ -12,11 +12,11 @@ from collections.abc import Iterator
 import httpx
 import pytest
 import zenoh
-from interactions import check_recording, essences, expected, interact
-from mesh import LiveMesh
 from prometheus_client.parser import text_string_to_metric_families
-from shift_runtime.zenoh_config import zenoh_config
+from shift_runtime.bus.zenoh_config import zenoh_config
 from shift_schemas.keys import DOORS, PROCEDURE_OWNER, SUBJECTS
+from support.interactions import check_recording, essences, expected, interact
+from support.whole_mesh import LiveMesh
 
 SERVICES = ("recorder", "monitor", "decider", "learner")
 SESSION = "haunted"

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import httpx
 import pytest
-from mesh import running_mesh
-from shift_recorder.reading import Recording
-from shift_recorder.verify import verify
+from shift_recording.mcap.reader import Recording
 from shift_runtime.rest_client import RestClient
 from shift_schemas.messages import GazeChunk
+from shift_verify.verify import verify
+from support.whole_mesh import running_mesh
 
 KEPT = Path(__file__).parents[1] / "data" / "v0.1"
 RECORDINGS = sorted(KEPT.glob("*.mcap"))

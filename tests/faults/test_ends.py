@@ -12,13 +12,13 @@ from pathlib import Path
 
 import httpx
 import pytest
-from interactions import STUDY
-from mesh import LiveMesh, running_mesh
-from shift_recorder.reading import Recording
-from shift_recorder.verify import verify
+from shift_recording.mcap.reader import Recording
 from shift_runtime.rest_client import RestClient
 from shift_schemas.messages import GazeChunk
-from test_start_and_room import AS_ROOT, fill, small_disk
+from shift_verify.verify import verify
+from support.interactions import STUDY
+from support.small_disk import AS_ROOT, fill, small_disk
+from support.whole_mesh import LiveMesh, running_mesh
 
 ROOM_LEFT_KB = (0, 100, 200, 400)
 """What the disk has left when the end is asked for: each stops the merge at another place."""

@@ -7,10 +7,10 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from interactions import check_recording, essences, expected, interact
-from mesh import LiveMesh, running_mesh
-from shift_recorder.verify import verify
 from shift_runtime.rest_client import RestClient
+from shift_verify.verify import verify
+from support.interactions import check_recording, essences, expected, interact
+from support.whole_mesh import LiveMesh, running_mesh
 
 WORKERS = ("shift_monitor", "shift_decider", "shift_learner")
 ALL = (*WORKERS, "shift_recorder", "shift_gateway", "shift_runtime.router")

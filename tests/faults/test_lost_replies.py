@@ -7,17 +7,17 @@ from pathlib import Path
 
 import httpx
 import pytest
-from interactions import STUDY, check_recording, essences, expected, played
-from mesh import LiveMesh, running_mesh
 from shift_runtime.rest_client import RestClient
 from shift_schemas.messages import GazeChunk
 from shift_simulator.live import LiveEpisode, drive
 from shift_simulator.users import paper_user
+from support.interactions import STUDY, check_recording, essences, expected, played
+from support.whole_mesh import LiveMesh, running_mesh
 
 
 @pytest.fixture(scope="module")
 def mesh(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LiveMesh]:
-    program = (str(Path(__file__).with_name("dying_mesh.py")),)
+    program = (str(Path(__file__).parents[1] / "support" / "dying_mesh.py"),)
     with running_mesh(tmp_path_factory.mktemp("dying"), program=program) as running:
         yield running
 

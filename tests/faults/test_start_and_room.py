@@ -13,15 +13,15 @@ from typing import Any
 
 import httpx
 import pytest
-from interactions import STUDY, check_recording, essences, expected, interact, played
-from mesh import READY_WITHIN_S, LiveMesh, free_port, running_mesh
 from shift_runtime.rest_client import RestClient
 from shift_schemas.errors import Unavailable
 from shift_simulator.live import LiveEpisode, drive
 from shift_simulator.users import paper_user
+from support.interactions import STUDY, check_recording, essences, expected, interact, played
+from support.small_disk import AS_ROOT, fill, small_disk
+from support.whole_mesh import READY_WITHIN_S, LiveMesh, free_port, running_mesh
 
 SERVICES = ("gateway", "learner", "decider", "monitor", "recorder")
-AS_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="mounts a small file system")
 
 
 def waited(there: Any) -> Any:
@@ -88,18 +88,6 @@ def test_row_10_services_wait_for_the_router_say_so_and_work_once_it_comes(
 # --- rows 11 and 12 ---
 
 
-@contextmanager
-def small_disk(folder: Path, megabytes: int) -> Iterator[None]:
-    folder.mkdir(parents=True, exist_ok=True)
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", folder], capture_output=True)
-    if mounted.returncode:
-        pytest.skip("no mounts here")
-    try:
-        yield
-    finally:
-        subprocess.run(["umount", "--lazy", folder], check=True)
-
-
 @AS_ROOT
 def test_row_11_a_disk_that_fills_up_refuses_and_goes_on_exactly_once_there_is_room(tmp_path: Path) -> None:
     data = tmp_path / "data"
@@ -126,17 +114,6 @@ def test_row_11_a_disk_that_fills_up_refuses_and_goes_on_exactly_once_there_is_r
         assert (counts["decision"], counts["performance"], counts["transition"]) == (20, 20, 20)
         assert mesh.log.read_text().count("was ended by") == 0
         assert mesh.stop() == 0
-
-
-def fill(ballast: Path) -> None:
-    """Take all the room that there is, to the last page."""
-    with open(ballast, "wb", buffering=0) as file:
-        for size in (2**20, 2**12):
-            try:
-                while True:
-                    file.write(bytes(size))
-            except OSError:
-                continue
 
 
 def _refusal(mesh: LiveMesh) -> httpx.Response:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from mesh import LiveMesh, free_port, running_mesh
-from suspended import begin, check, suspend
+from support.suspension import begin, check, suspend
+from support.whole_mesh import LiveMesh, free_port, running_mesh
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 
 import pytest
-from gateway_mesh import Mesh, running_mesh
+from support.gateway_mesh import Mesh, running_mesh
 
 
 @pytest.fixture(scope="module")

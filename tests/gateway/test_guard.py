@@ -9,13 +9,12 @@ from pathlib import Path
 
 import httpx
 import pytest
-from gateway_mesh import Mesh
-from live_gateway import served
 from shift_gateway.app import make_app
 from shift_gateway.settings import GatewaySettings
+from shift_runtime.bus.memory import Hub, MemoryBus
 from shift_runtime.clock import ManualClock
-from shift_runtime.memory_bus import Hub, MemoryBus
-from test_gateway_problems import problem
+from support.gateway_mesh import Mesh, problem
+from support.live_gateway import served
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 from fastapi import FastAPI, Request, WebSocket
-from live_gateway import answers, served
+from support.live_gateway import answers, served
 from websockets.sync.client import connect
 
 OFFER = b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AAEAAEAAAAIAAAAA\r\n"

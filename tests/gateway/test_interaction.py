@@ -8,13 +8,11 @@ from math import exp
 from typing import Any
 
 import pytest
-from gateway_mesh import Mesh, Session, events_of, gaze_socket, performance
-from shift_schemas.randomness import pick, uniform
-from shift_schemas.words import TRIPLES, Triple
-from test_gateway_sessions import STUDY
+from shift_model.random_numbers import pick, uniform
+from shift_model.vocabulary import TRIPLES, Triple
+from support.gateway_mesh import NEGATED, PLAIN, STUDY, Mesh, Session, events_of, gaze_socket, performance
 
 pytestmark = pytest.mark.anyio
-PLAIN, NEGATED = {"negation": "affirmation", "hesitation": "none"}, {"negation": "negation", "hesitation": "none"}
 ACTIONS = [
     {"negation": n, "hesitation": h}
     for n in ("affirmation", "negation_affirmation", "negation")

@@ -7,14 +7,11 @@ import json
 from collections.abc import AsyncIterator
 from typing import Any
 
-import httpx
 import pytest
-from gateway_mesh import Mesh, performance, until_ready
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from prometheus_client.parser import text_string_to_metric_families
-from test_gateway_interaction import NEGATED
-from test_gateway_sessions import STUDY
+from support.gateway_mesh import NEGATED, STUDY, Mesh, performance, problem, until_ready
 
 pytestmark = pytest.mark.anyio
 LEFT_OUT = (("decisions", "decision_id"), ("override", "override_id"), ("markers", "marker_id"))
@@ -29,22 +26,6 @@ COMMANDS: dict[str, Any] = {
 }
 READS = ("", "observation", "policy", "config", "strategy?task=grasp", "events")
 WAIT = {"study": "x", "decider": {"wait_s": 0.2}}
-
-
-def problem(answer: httpx.Response, status: int) -> dict[str, Any]:
-    """The problem document of an answer, which has its shape."""
-    assert answer.status_code == status, answer.text[:500]
-    assert answer.headers["content-type"] == "application/problem+json"
-    found: dict[str, Any] = answer.json()
-    assert found.keys() == {"type", "title", "status", "detail", "errors"}
-    assert found["status"] == status
-    assert all(isinstance(found[name], str) and found[name] for name in ("type", "title", "detail"))
-    for error in found["errors"]:
-        assert error.keys() == {"field", "value", "rule"}
-        assert len(error["field"]) <= 80
-        assert len(error["value"]) <= 80
-    assert len(answer.content) < 16_000, "no echo of long input"
-    return found
 
 
 # --- order and ids ---

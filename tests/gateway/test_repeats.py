@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from gateway_mesh import Mesh
+from support.gateway_mesh import Mesh
 
 pytestmark = pytest.mark.anyio
 

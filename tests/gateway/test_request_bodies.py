@@ -6,8 +6,7 @@ import gzip
 import json
 
 import pytest
-from gateway_mesh import Mesh, gaze_socket
-from test_gateway_problems import problem
+from support.gateway_mesh import Mesh, gaze_socket, problem
 
 pytestmark = pytest.mark.anyio
 START = '{"participant": "P01"}'

@@ -9,16 +9,10 @@ from io import BytesIO
 from typing import Any
 
 import pytest
-from gateway_mesh import START_NS, Mesh
 from mcap.reader import make_reader
+from support.gateway_mesh import START_NS, STUDY, Mesh
 
 pytestmark = pytest.mark.anyio
-STUDY: dict[str, Any] = {
-    "study": "mine",
-    "tasks": ["grasp", "turn"],
-    "aois": [{"name": "robot", "rectangle": [0, 0, 0.5, 1]}, {"name": "cup", "rectangle": [0.5, 0, 1, 1]}],
-    "conditions": {"control": {"learner": {"name": "scoring"}}, "adaptive": {}},
-}
 
 
 # --- start ---

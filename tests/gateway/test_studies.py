@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from gateway_mesh import Mesh
-from shift_runtime.studies import study_to_start
+from shift_runtime.study_files import study_to_start
+from support.gateway_mesh import Mesh
 
 pytestmark = pytest.mark.anyio
 

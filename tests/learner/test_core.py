@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from shift_learner import core
 from shift_learner.core import LearnerState
 from shift_learner.learners import learner_named
+from shift_model.vocabulary import TRIPLES, Triple
+from shift_schemas.core_protocol import NotYet
 from shift_schemas.errors import Conflict, InvalidStudy, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import (
     FORMAT,
@@ -27,12 +29,10 @@ from shift_schemas.messages import (
     Transition,
     Versions,
 )
-from shift_schemas.scoring import reduce, view
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_json, study_of
-from shift_schemas.words import TRIPLES, Triple
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import study_json, study_of
+from shift_study.scoring import reduce, view
+from shift_study.study import Study
 
 NOW = Stamp(sec=1_700_000_000, nsec=0)
 FOCUSED = Triple("high", "focused", "unknown")

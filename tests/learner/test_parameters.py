@@ -9,8 +9,8 @@ import pytest
 from shift_learner.learner import Context, Taken
 from shift_learner.learners import LEARNERS, planner
 from shift_learner.learners.planning.engine import model_of
-from shift_schemas.study import LearnerSettings, Study
-from shift_schemas.study_checks import LEARNER_PARAMETERS
+from shift_study.checks import LEARNER_PARAMETERS
+from shift_study.study import LearnerSettings, Study
 
 
 class Watched(LearnerSettings):

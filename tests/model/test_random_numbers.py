@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_schemas.randomness import DECISION, pick, uniform
+from shift_model.random_numbers import DECISION, pick, uniform
 
 seeds = st.integers(0, 2**53 - 1)
 numbers = st.integers(0, 2**31)

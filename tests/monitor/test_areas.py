@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from shift_monitor.areas import NOWHERE, area_at, area_of
-from shift_schemas.study import Aoi, Study
+from shift_study.study import Aoi, Study
 
 THIRDS = [area_of(a) for a in Study(study="default").aois]
 

@@ -7,11 +7,11 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from monitor_sessions import began, fold, last, names, study
 from shift_monitor.areas import NOWHERE
 from shift_monitor.attention import Attention, Dwell, dwelt, fresh, gaze_class, met_aoi, weights_after
-from shift_schemas.stamps import NS
-from shift_schemas.study import AttentionSettings
+from shift_schemas.timestamps import NS
+from shift_study.study import AttentionSettings
+from support.monitor_sessions import began, fold, last, names, study
 
 SETTINGS = AttentionSettings()
 STEP_NS = NS // 10

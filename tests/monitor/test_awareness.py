@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 
 import pytest
-from monitor_sessions import began, config, fold, last, performance, study
 from shift_monitor.awareness import HISTORY_LENGTH, History, awareness_view, corrected, reported
 from shift_schemas.messages import Performance
+from support.monitor_sessions import began, config, fold, last, performance, study
 
 
 @pytest.mark.parametrize(

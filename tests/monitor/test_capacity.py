@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 
 import pytest
-from monitor_sessions import AFFIRMATION, NEGATION, began, decision, fold, last, study
 from shift_monitor.capacity import Capacity, capacity_class, executed
-from shift_schemas.study import CapacitySettings
+from shift_study.study import CapacitySettings
+from support.monitor_sessions import AFFIRMATION, NEGATION, began, decision, fold, last, study
 
 SETTINGS = CapacitySettings()
 STRATEGIES = [

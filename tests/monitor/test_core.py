@@ -7,7 +7,25 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from monitor_sessions import (
+from shift_cli.gaze_files import Sample, chunks
+from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
+from shift_monitor.gaze_input import gaze_input
+from shift_schemas.core_protocol import NotYet
+from shift_schemas.errors import Conflict, MalformedMessage, Unavailable, UnknownThing
+from shift_schemas.messages import (
+    Config,
+    Decision,
+    Fact,
+    Gaze,
+    GazeChunk,
+    Marker,
+    Message,
+    Observation,
+    Performance,
+    Session,
+)
+from shift_schemas.timestamps import Stamp
+from support.monitor_sessions import (
     NEGATION,
     NOW,
     RECORDINGS,
@@ -26,24 +44,6 @@ from monitor_sessions import (
     session,
     study,
 )
-from shift_cli.gaze_files import Sample, chunks
-from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
-from shift_monitor.gaze_input import gaze_input
-from shift_schemas.errors import Conflict, MalformedMessage, Unavailable, UnknownThing
-from shift_schemas.messages import (
-    Config,
-    Decision,
-    Fact,
-    Gaze,
-    GazeChunk,
-    Marker,
-    Message,
-    Observation,
-    Performance,
-    Session,
-)
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet
 
 REAL = recording(RECORDINGS[2])  # the one with the most loss
 

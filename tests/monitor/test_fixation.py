@@ -8,10 +8,10 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from monitor_sessions import RECORDINGS, began, fixations, fold, last, played, points, recording, session, study
 from shift_cli.gaze_files import Sample
-from shift_schemas.stamps import NS
-from shift_schemas.study import FixationSettings
+from shift_schemas.timestamps import NS
+from shift_study.study import FixationSettings
+from support.monitor_sessions import RECORDINGS, began, fixations, fold, last, played, points, recording, session, study
 
 Plain = tuple[int, float, float, int]
 SETTINGS = FixationSettings()

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from monitor_sessions import NOW, began, fold, last, names, performance, points, study
 from shift_monitor.core import step
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.messages import Gaze, GazeChunk, Observation
-from shift_schemas.stamps import NS, Stamp
+from shift_schemas.timestamps import NS, Stamp
+from support.monitor_sessions import NOW, began, fold, last, names, performance, points, study
 
 
 def at_rate(hz: float, n: int, x: float | None = 0.1, seq: int = 0, start_s: float = 10.0) -> GazeChunk:

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from I2MC import I2MC
-from monitor_sessions import RECORDINGS, fixations, last, played, recording, study
 from shift_schemas.messages import Fact
-from shift_schemas.study import Study
+from shift_study.study import Study
+from support.monitor_sessions import RECORDINGS, fixations, last, played, recording, study
 
 WIDTH, HEIGHT = 1920.0, 1080.0
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from monitor_sessions import NOW, Recorded, began, fixations, fold, last, names, points, session
 from shift_monitor.core import MonitorState, dump, load, step
 from shift_monitor.gaze_input import gaze_input
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.messages import Gaze, GazeChunk, Observation
+from support.monitor_sessions import NOW, Recorded, began, fixations, fold, last, names, points, session
 
 
 def look(seq: int, start_s: float, x: float) -> GazeChunk:

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_recorder import core
 from shift_recorder.core import FinishSession, RecorderState, config_answer, session_answer
+from shift_schemas.core_protocol import Step
 from shift_schemas.errors import Conflict, InvalidStudy, MalformedMessage, ShiftError, UnknownThing
 from shift_schemas.messages import Command, Config, Configure, EndSession, Mark, Marker, Session, StartSession
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import Step
-from shift_schemas.study_text import study_from_json, study_of
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import study_from_json, study_of
 
 NOW, LATER = Stamp(sec=1_700_000_000, nsec=5), Stamp(sec=1_700_000_100, nsec=0)
 STUDY: dict[str, Any] = {"study": "mine", "conditions": {"control": {"learner": {"name": "scoring"}}}}

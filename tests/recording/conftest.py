@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from recorder_fixtures import finished, interleaved, write_segment
-from shift_recorder import finishing
+from shift_recording import merging as finishing
+from support.recordings import finished, interleaved, write_segment
 
 
 @pytest.fixture(scope="session")

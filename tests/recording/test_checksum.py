@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from shift_recorder.checksum import Checksum, check, checksum_path, sha256_of, write_checksum
+from shift_recording.checksum import Checksum, check, checksum_path, sha256_of, write_checksum
 from shift_schemas.errors import DamagedRecording, UnknownThing
 
 

@@ -8,7 +8,14 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from recorder_fixtures import (
+from shift_recording import merging as finishing
+from shift_recording.checksum import Checksum, check
+from shift_recording.durable_file import StorageFailed
+from shift_recording.mcap.reader import Recording
+from shift_recording.merging import finish_recording
+from shift_schemas.errors import Conflict, UnknownThing
+from shift_schemas.keys import OWNER_OF
+from support.recordings import (
     ATTACHMENTS,
     METADATA,
     SCHEMAS,
@@ -18,13 +25,6 @@ from recorder_fixtures import (
     owner_sequences,
     write_segment,
 )
-from shift_recorder import finishing
-from shift_recorder.checksum import Checksum, check
-from shift_recorder.finishing import finish_recording
-from shift_recorder.reading import Recording
-from shift_recorder.storage import StorageFailed
-from shift_schemas.errors import Conflict, UnknownThing
-from shift_schemas.keys import OWNER_OF
 
 
 def messages(path: Path) -> list[tuple[object, ...]]:
@@ -159,7 +159,7 @@ def test_a_failure_leaves_the_earlier_recording_and_no_rest(tmp_path: Path, monk
     def refuses(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("shift_recorder.storage.os.fsync", refuses)
+    monkeypatch.setattr("shift_recording.durable_file.os.fsync", refuses)
     with pytest.raises(StorageFailed, match="No space left"):
         finished(tmp_path, [source])
     monkeypatch.undo()

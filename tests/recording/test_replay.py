@@ -9,18 +9,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from shift_recorder.reading import Recording
-from shift_recorder.replay import Pacer, Replay, TimeLine, check_free, extent_of, play, replay_session
-from shift_runtime.bus import Incoming, Request
-from shift_runtime.memory_bus import Hub, MemoryBus
+from shift_recording.mcap.reader import Recording
+from shift_recording.replay import Pacer, Replay, TimeLine, check_free, extent_of, play, replay_session
+from shift_runtime.bus.memory import Hub, MemoryBus
+from shift_runtime.bus.protocol import Incoming, Request
 from shift_runtime.reader import Reader, ReadFact
 from shift_schemas.codec import encode
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, UnknownThing
 from shift_schemas.ids import is_id
 from shift_schemas.keys import OWNERS
 from shift_schemas.messages import OutboxPage
-from shift_schemas.stamps import NS
-from verify_sessions import Session
+from shift_schemas.timestamps import NS
+from support.verify_sessions import Session
 
 RATE = 200.0
 

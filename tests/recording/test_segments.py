@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from recorder_fixtures import SCHEMAS, interleaved, write_segment
-from shift_recorder.parsing import Attachment
-from shift_recorder.reading import Recording
-from shift_recorder.segments import SegmentWriter, segments_of
-from shift_recorder.storage import DurableFile, StorageFailed
-from shift_recorder.writing import MAXIMUM_PAYLOAD, RecordingWriter
+from shift_recording.durable_file import DurableFile, StorageFailed
+from shift_recording.mcap.reader import Recording
+from shift_recording.mcap.records import Attachment
+from shift_recording.mcap.writer import MAXIMUM_PAYLOAD, RecordingWriter
+from shift_recording.segments import SegmentWriter, segments_of
 from shift_schemas.errors import MalformedMessage, TooLarge
 from shift_schemas.keys import SUBJECTS
+from support.recordings import SCHEMAS, interleaved, write_segment
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 
 
 def test_a_finished_segment_is_a_valid_file_with_index(tmp_path: Path) -> None:
@@ -110,8 +110,8 @@ def run(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from recorder_fixtures import SCHEMAS, interleaved
-from shift_recorder.segments import SegmentWriter
+from support.recordings import SCHEMAS, interleaved
+from shift_recording.segments import SegmentWriter
 segment = SegmentWriter(Path(sys.argv[1]), "s1", SCHEMAS)
 for i, message in enumerate(interleaved(700), start=1):
     segment.write(*message)
@@ -138,9 +138,9 @@ def test_kill_9_loses_nothing_that_was_flushed(tmp_path: Path, at: int) -> None:
 READ_ONLY = """
 import os, sys
 from pathlib import Path
-from recorder_fixtures import SCHEMAS
-from shift_recorder.segments import SegmentWriter
-from shift_recorder.storage import StorageFailed
+from support.recordings import SCHEMAS
+from shift_recording.segments import SegmentWriter
+from shift_recording.durable_file import StorageFailed
 if os.geteuid() == 0:
     os.seteuid(65534)
 try:
@@ -154,9 +154,9 @@ else:
 FULL = """
 import resource, signal, sys
 from pathlib import Path
-from recorder_fixtures import SCHEMAS, interleaved
-from shift_recorder.segments import SegmentWriter
-from shift_recorder.storage import StorageFailed
+from support.recordings import SCHEMAS, interleaved
+from shift_recording.segments import SegmentWriter
+from shift_recording.durable_file import StorageFailed
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 segment = SegmentWriter(Path(sys.argv[1]), "s1", SCHEMAS)
 resource.setrlimit(resource.RLIMIT_FSIZE, (40_000, 40_000))

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from mesh import running_mesh
-from peers import ROOT
-from ros_rig import Bridge, Peer, peer
 from ruamel.yaml import YAML
+from support.ros_environments import ROOT
+from support.ros_rig import Bridge, Peer, peer
+from support.whole_mesh import running_mesh
 
 pytestmark = pytest.mark.timeout(280)
 PAGE = (ROOT / "docs" / "ros2.md").read_text()

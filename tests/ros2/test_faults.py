@@ -13,12 +13,12 @@ from typing import Any
 import httpx
 import pytest
 import zenoh
-from mesh import LiveMesh, running_mesh
-from ros_rig import Bridge, Peer, peer
-from shift_recorder.reading import Recording
+from shift_recording.mcap.reader import Recording
 from shift_ros2 import cdr
-from shift_ros2.wire import NO_HASH, STRING, TRIGGER, Attachment, RosType, data_key
-from shift_runtime.zenoh_config import zenoh_config
+from shift_ros2.rmw_zenoh import NO_HASH, STRING, TRIGGER, Attachment, RosType, data_key
+from shift_runtime.bus.zenoh_config import zenoh_config
+from support.ros_rig import Bridge, Peer, peer
+from support.whole_mesh import LiveMesh, running_mesh
 
 pytestmark = pytest.mark.timeout(280)
 RESULT = {"success": True, "duration_s": 2.5}

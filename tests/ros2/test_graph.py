@@ -10,10 +10,10 @@ from typing import Any
 
 import httpx
 import pytest
-from mesh import LiveMesh, running_mesh
-from ros_rig import Bridge, peer
-from shift_recorder.reading import Recording
+from shift_recording.mcap.reader import Recording
 from shift_ros2.interfaces import INTERFACES
+from support.ros_rig import Bridge, peer
+from support.whole_mesh import LiveMesh, running_mesh
 
 pytestmark = pytest.mark.timeout(280)
 KINDS = {"in": "MS", "out": "MP", "service": "SS"}

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_ros2.gathering import Lane, joined
+from shift_ros2.gaze_batching import Lane, joined
 from shift_ros2.mapping import (
     GazeArrival,
     gaze_of,
@@ -21,7 +21,7 @@ from shift_ros2.mapping import (
 )
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Problem, ShiftError
 from shift_schemas.messages import CapacityView, GazeChunk, GazeView, Observation
-from shift_schemas.stamps import Stamp
+from shift_schemas.timestamps import Stamp
 
 NOW_S = 1000.0
 RESULT = {"success": True, "duration_s": 5.0}

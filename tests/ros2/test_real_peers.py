@@ -13,11 +13,11 @@ from typing import Any
 
 import httpx
 import pytest
-from mesh import LiveMesh, running_mesh
-from peers import ROOT, python_of
-from ros_rig import Bridge, Peer, peer
 from shift_cli.gaze_files import samples
-from shift_recorder.reading import Recording
+from shift_recording.mcap.reader import Recording
+from support.ros_environments import ROOT, python_of
+from support.ros_rig import Bridge, Peer, peer
+from support.whole_mesh import LiveMesh, running_mesh
 
 pytestmark = pytest.mark.timeout(280)
 PEERS = {"pyzeros": "native", "sdk": "native", "rclpy": "rclpy"}

@@ -14,8 +14,8 @@ from typing import Any
 
 import httpx
 import pytest
-from mesh import LiveMesh, running_mesh
-from ros_rig import Bridge, Peer, peer
+from support.ros_rig import Bridge, Peer, peer
+from support.whole_mesh import LiveMesh, running_mesh
 
 pytestmark = pytest.mark.timeout(280)
 BOTH = pytest.mark.parametrize(("name", "backend"), [("pyzeros", "native"), ("rclpy", "rclpy")])

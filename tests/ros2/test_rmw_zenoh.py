@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from shift_ros2 import cdr
+from shift_ros2.rmw_zenoh import NO_HASH, STRING, TRIGGER, Attachment, Node, data_key, gid_of, hash_of, qos_text
 from shift_ros2.ros4hri import ENGAGEMENT_LEVEL
-from shift_ros2.wire import NO_HASH, STRING, TRIGGER, Attachment, Node, data_key, gid_of, hash_of, qos_text
 from shift_schemas.errors import MalformedMessage
 
 TEXT = st.text(st.characters(blacklist_characters="\0", blacklist_categories=["Cs"]))

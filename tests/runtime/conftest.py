@@ -6,11 +6,11 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 
 import pytest
 import zenoh
-from runtime_fixtures import free_endpoint
-from shift_runtime.bus import Bus
-from shift_runtime.memory_bus import Hub, MemoryBus
-from shift_runtime.zenoh_bus import ZenohBus
-from shift_runtime.zenoh_config import zenoh_config
+from shift_runtime.bus.memory import Hub, MemoryBus
+from shift_runtime.bus.protocol import Bus
+from shift_runtime.bus.zenoh import ZenohBus
+from shift_runtime.bus.zenoh_config import zenoh_config
+from support.runtime_fixtures import free_endpoint
 
 OpenBus = Callable[[], Awaitable[Bus]]
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 from shift_runtime import claim as module
+from shift_runtime.bus.memory import Hub, MemoryBus
 from shift_runtime.claim import Claim, OwnedElsewhere, mesh_id
-from shift_runtime.memory_bus import Hub, MemoryBus
 from shift_schemas.codec import encode
 from shift_schemas.messages import Health
-from shift_schemas.stamps import Stamp
+from shift_schemas.timestamps import Stamp
 
 pytestmark = pytest.mark.anyio
 KEY = "shift/v1/@service/monitor/health"

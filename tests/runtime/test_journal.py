@@ -13,10 +13,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from runtime_fixtures import row
 from shift_runtime.journal import LOG_PAGES, PAGE_BYTES, Batch, Journal, StoredAnswer, digest_of, same_content
 from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
+from support.runtime_fixtures import row
 
 START = ("s1", "start_session", "start")
 
@@ -210,7 +210,7 @@ COMMITTING = """
 import sys
 sys.path[:0] = {path!r}
 from pathlib import Path
-from runtime_fixtures import row
+from support.runtime_fixtures import row
 from shift_runtime.journal import Batch, Journal, StoredAnswer
 journal = Journal(Path(sys.argv[1]), "monitor")
 n = journal.heads.get("s1", 0)
@@ -225,7 +225,7 @@ while True:
 
 
 def test_kill_9_in_the_middle_of_commits_leaves_1_to_n_and_all_that_was_acknowledged(path: Path) -> None:
-    program = COMMITTING.format(path=[p for p in sys.path if p.endswith("tests/runtime")])
+    program = COMMITTING.format(path=[p for p in sys.path if p.endswith("/tests")])
     for life in range(6):
         worker = subprocess.Popen([sys.executable, "-c", program, str(path)], stdout=subprocess.PIPE, text=True)
         assert worker.stdout is not None

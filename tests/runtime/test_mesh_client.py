@@ -6,15 +6,15 @@ import asyncio
 from pathlib import Path
 
 import pytest
-from runtime_fixtures import loads, until
 from shift_runtime import mesh_client as mesh_client_module
-from shift_runtime.bus import Request
-from shift_runtime.memory_bus import Hub, MemoryBus
+from shift_runtime.bus.memory import Hub, MemoryBus
+from shift_runtime.bus.protocol import Request
 from shift_runtime.mesh_client import MeshClient
 from shift_schemas.codec import encode
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Problem, Unavailable
 from shift_schemas.messages import Answer, Decide, GazeChunk, Health, OutboxQuery
-from worker_rig import Rig, config, session
+from support.runtime_fixtures import loads, until
+from support.worker_rig import Rig, config, session
 
 pytestmark = pytest.mark.anyio
 DECIDE = Decide(command_id="d1", session="s1", task="grasp")

@@ -11,15 +11,15 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runtime_fixtures import marker, row, until
 from shift_runtime import reader as reader_module
-from shift_runtime.bus import Bus, Handle, Request
-from shift_runtime.memory_bus import Hub, MemoryBus
+from shift_runtime.bus.memory import Hub, MemoryBus
+from shift_runtime.bus.protocol import Bus, Handle, Request
 from shift_runtime.reader import Reader, ReadFact, fact_of
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import FactKey, ServiceKey, build_key
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
+from support.runtime_fixtures import marker, row, until
 
 OUTBOX = build_key(ServiceKey("recorder", "outbox"))
 

@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 
 import pytest
-from shift_runtime.studies import BUILT_IN, LARGEST_BYTES, find_study, list_studies, study_to_start
+from shift_runtime.study_files import BUILT_IN, LARGEST_BYTES, find_study, list_studies, study_to_start
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_data, study_of
+from shift_study.loading import study_data, study_of
+from shift_study.study import Study
 
 
 def started(name: str, folder: Path) -> Study:

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 from shift_schemas.codec import decode, encode, encode_answer, encoding_of
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.messages import COMMANDS, FACTS, Answer, Configure, Decide, Decision, GazeChunk, OutboxQuery
-from strategies import json_values
+from support.message_strategies import json_values
 
 KINDS: list[type[BaseModel]] = [*FACTS.values(), *COMMANDS.values(), GazeChunk, OutboxQuery, Answer]
 DECIDE = '{"command_id":"d1","session":"s1","task":"grasp"}'

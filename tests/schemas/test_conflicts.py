@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shift_schemas.conflicts import differences, repeat_conflict
 from shift_schemas.messages import (
     COMMANDS,
     Command,
@@ -18,7 +19,6 @@ from shift_schemas.messages import (
     SetOverride,
     StartSession,
 )
-from shift_schemas.repeats import differences, repeat_conflict
 
 
 def refused(before: Command, now: Command) -> str:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 from shift_schemas.errors import MalformedMessage, check_id, malformed
 from shift_schemas.ids import ID_PATTERN, Id, is_id, not_an_id, propose_id
-from strategies import HOSTILE_IDS, ids
+from support.message_strategies import HOSTILE_IDS, ids
 
 _FIELD = TypeAdapter(Id)
 

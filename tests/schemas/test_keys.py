@@ -22,7 +22,7 @@ from shift_schemas.keys import (
     parse_key,
 )
 from shift_schemas.messages import COMMANDS, FACTS
-from strategies import HOSTILE_IDS, ids
+from support.message_strategies import HOSTILE_IDS, ids
 
 keys = (
     st.builds(FactKey, ids, st.sampled_from(SUBJECTS))

@@ -5,11 +5,11 @@ import json
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_schemas.bodies import PatchBody, StartBody
 from shift_schemas.codec import decode
 from shift_schemas.errors import MalformedMessage
+from shift_schemas.requests import PatchBody, StartBody
 from shift_schemas.strict_json import parse_json
-from strategies import json_values
+from support.message_strategies import json_values
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from shift_schemas.hints import did_you_mean, level_like, nearest
+from shift_schemas.suggestions import did_you_mean, level_like, nearest
 
 TASKS = ["grasp", "turn", "pour"]
 

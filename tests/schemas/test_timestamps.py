@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from shift_schemas.stamps import NS, Stamp
+from shift_schemas.timestamps import NS, Stamp
 
 
 @given(st.integers(0, 2**40 * NS))

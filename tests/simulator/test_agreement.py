@@ -4,33 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shift_learner.learner import Context
-from shift_schemas.randomness import uniform
-from shift_schemas.study import Study
-from shift_schemas.words import Triple
-from shift_simulator.batch import batch_learner
-from shift_simulator.draws import SESSION, session_seed, session_seeds
-from shift_simulator.dynamics import simulate
-from shift_simulator.events import Episode, play
+from shift_model.random_numbers import uniform
+from shift_simulator.random_streams import SESSION, session_seed, session_seeds
 from shift_simulator.users import User, paper_user
-
-EPISODES = 60
-
-
-def triple_of(episode: Episode) -> int:
-    seen = episode.decision.observation
-    return Triple(seen.capacity, seen.gaze, seen.awareness).number
-
-
-def check_agreement(user: User, study: Study, runs: int, episodes: int = EPISODES) -> None:
-    seeds = session_seeds(3, runs)
-    trace = simulate(user, study, batch_learner(Context(study), runs), seeds, episodes)
-    for run, seed in enumerate(seeds):
-        played = list(play(user, study, int(seed), episodes))
-        assert [triple_of(e) for e in played] == trace.triple[:, run].tolist()
-        assert [e.action for e in played] == trace.action[:, run].tolist()
-        assert [e.performance.reward for e in played] == trace.reward[:, run].tolist()
-        assert [e.performance.cumulative_reward for e in played] == trace.cumulative[:, run].tolist()
+from shift_study.study import Study
+from support.agreement import check_agreement
 
 
 @pytest.mark.parametrize("name", ["A", "B", "C", "D"])

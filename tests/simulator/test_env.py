@@ -13,10 +13,10 @@ gymnasium = pytest.importorskip("gymnasium", reason="an optional extra")
 
 import shift_simulator.env  # noqa: E402, F401
 from gymnasium.utils.env_checker import check_env  # noqa: E402
-from shift_schemas.study import Study  # noqa: E402
 from shift_simulator import ENV_ID  # noqa: E402
 from shift_simulator.optimum import optimum  # noqa: E402
 from shift_simulator.users import paper_user  # noqa: E402
+from shift_study.study import Study  # noqa: E402
 
 
 @pytest.mark.parametrize("user", ["A", "B", "C", "D"])

@@ -5,14 +5,14 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
+from shift_model.vocabulary import GAZES, GazeClass
 from shift_monitor import core
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.messages import FORMAT, Config, Observation, Session
-from shift_schemas.stamps import Stamp
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_json
-from shift_schemas.words import GAZES, GazeClass
+from shift_schemas.timestamps import Stamp
 from shift_simulator.gaze_plan import chunk_of, plan_gaze
+from shift_study.loading import study_json
+from shift_study.study import Study
 
 NOW = Stamp.of(0)
 BEGUN = Session(session="s", stamp=NOW, participant="p", study="s", seed=1, state="live", started=NOW, format=FORMAT)

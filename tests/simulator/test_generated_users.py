@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from shift_simulator.compare import rewards_of
-from shift_simulator.deviants import FAMILIES, flipped
+from shift_simulator.generated_users import FAMILIES, flipped
 from shift_simulator.users import paper_user, parse_user
 
 

@@ -7,11 +7,11 @@ from math import exp
 import numpy as np
 import pytest
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.study import Study
+from shift_simulator.batched_sessions import costs
 from shift_simulator.compare import rewards_of
-from shift_simulator.dynamics import costs
 from shift_simulator.optimum import optimum
 from shift_simulator.users import User, paper_user
+from shift_study.study import Study
 
 STUDY = Study(study="s")
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from shift_schemas.study import Study
 from shift_simulator.users import User, paper_user
-from test_agreement import check_agreement
+from shift_study.study import Study
+from support.agreement import check_agreement
 
 PLANNER = Study.model_validate({"study": "s", "learner": {"name": "planner"}})
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shift_schemas.study import Study
 from shift_simulator.criterion import CROSSINGS, passed
-from shift_simulator.draws import session_seed
-from shift_simulator.events import play
+from shift_simulator.random_streams import session_seed
+from shift_simulator.session import play
 from shift_simulator.table2 import PAPER, table2, zero_crossings
 from shift_simulator.user_study import crossing, users
 from shift_simulator.users import paper_user
+from shift_study.study import Study
 
 
 def naive_z(curve: list[float]) -> int:

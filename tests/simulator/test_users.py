@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from shift_model.vocabulary import TRIPLES
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.scoring import reduce
-from shift_schemas.study import ScoringSettings, Study
-from shift_schemas.words import TRIPLES
-from shift_simulator.people import person, task_names
+from shift_simulator.simulated_person import person, task_names
 from shift_simulator.users import User, paper_user, parse_user, true_capacity
+from shift_study.scoring import reduce
+from shift_study.study import ScoringSettings, Study
 
 SCORING = ScoringSettings.model_validate({})
 STUDY = Study(study="s")

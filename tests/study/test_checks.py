@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from shift_model.vocabulary import LearnerName
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.study import LearnerSettings, Study
-from shift_schemas.study_checks import LEARNER_PARAMETERS, PLAUSIBLE, study_mistakes, study_warnings
-from shift_schemas.study_text import parse_study, study_data, study_of
-from shift_schemas.words import LearnerName
+from shift_study.checks import LEARNER_PARAMETERS, PLAUSIBLE, study_mistakes, study_warnings
+from shift_study.loading import parse_study, study_data, study_of
+from shift_study.study import LearnerSettings, Study
 
 
 def warned(**parts: Any) -> tuple[str, ...]:

@@ -8,14 +8,13 @@ from typing import Any
 import jsonschema
 import pytest
 from ruamel.yaml import YAML
-from shift_schemas import study_schema
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.study import Study
-from shift_schemas.study_schema import schema_text, study_json_schema
-from shift_schemas.study_text import parse_study, study_data
-from test_study import CONTRACT, OUT_OF_RANGE, PACE, written
+from shift_study.json_schema import schema_text, study_json_schema
+from shift_study.loading import parse_study, study_data
+from shift_study.study import Study
+from support.study_texts import CONTRACT, OUT_OF_RANGE, PACE, written
 
-ROOT = Path(study_schema.__file__).parents[2]
+ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docs" / "study.schema.json"
 STUDIES = ROOT / "schemas" / "shift_schemas" / "studies"
 SCHEMA = study_json_schema()
@@ -38,7 +37,7 @@ def test_it_is_a_schema() -> None:
 
 
 def test_the_file_is_current() -> None:
-    remake = "make it anew: .venv/bin/python -m shift_schemas.study_schema > docs/study.schema.json"
+    remake = "make it anew: .venv/bin/python -m shift_study.json_schema > docs/study.schema.json"
     assert FILE.read_text() == schema_text(), remake
 
 

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.study_text import parse_study, study_of
-from shift_schemas.study_yaml import LARGEST
-from strategies import json_values
+from shift_study.loading import parse_study, study_of
+from shift_study.yaml_reader import LARGEST
+from support.message_strategies import json_values
 
 
 def refusal(text: str) -> str:

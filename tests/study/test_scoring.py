@@ -5,10 +5,10 @@ from collections import Counter
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_schemas.scoring import rank, reduce, suggestions, view
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_of
-from shift_schemas.words import AWARENESSES, CAPACITIES, COGNITIVE_STATES, GAZES, TRIPLES, Triple
+from shift_model.vocabulary import AWARENESSES, CAPACITIES, COGNITIVE_STATES, GAZES, TRIPLES, Triple
+from shift_study.loading import study_of
+from shift_study.scoring import rank, reduce, suggestions, view
+from shift_study.study import Study
 
 EO, EM, DM, OS, UF = (
     "engaged_observer", "engaged_misinterpreter", "distracted_misinterpreter", "overwhelmed_struggler", "unfocused",

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.study import Study
-from shift_schemas.study_text import parse_study, study_data, study_of
-from shift_schemas.study_yaml import read_yaml, write_yaml
-from shift_schemas.yaml_core import core_number, core_value
-from strategies import json_values
+from shift_study.loading import parse_study, study_data, study_of
+from shift_study.study import Study
+from shift_study.yaml_numbers import core_number, core_value
+from shift_study.yaml_reader import read_yaml, write_yaml
+from support.message_strategies import json_values
 
 WORDS = ["yes", "no", "on", "off", "true", "y", "n", "01", "010", "1", "2024", "2024-01-01", "1e3", "0x1F", "1_000"]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shift_cli.main import main
-from shift_runtime.worker import Worker
+from shift_runtime.service.loop import Worker
 
 tell = Worker._tell
 

@@ -24,13 +24,13 @@ from shift_learner.service import CORE as LEARNER
 from shift_monitor.service import CORE as MONITOR
 from shift_recorder.service import CORE as RECORDER
 from shift_recorder.service import RecorderWorker
-from shift_runtime.bus import Bus
+from shift_runtime.bus.memory import Hub, MemoryBus
+from shift_runtime.bus.protocol import Bus
 from shift_runtime.clock import ManualClock
 from shift_runtime.journal import Journal
-from shift_runtime.memory_bus import Hub, MemoryBus
 from shift_runtime.metrics import Metrics
+from shift_runtime.service.loop import Core, Worker
 from shift_runtime.settings import MeshSettings
-from shift_runtime.worker import Core, Worker
 
 CORES: dict[str, Core[Any]] = {core.name: core for core in (RECORDER, MONITOR, DECIDER, LEARNER)}
 START_NS = 1_700_000_000_000_000_000
@@ -274,3 +274,29 @@ async def gaze_socket(mesh: Mesh, session: str) -> AsyncIterator[Socket]:
         await call.incoming.put({"type": "websocket.connect"})
         assert (await call.next())["type"] == "websocket.accept"
         yield Socket(call)
+
+
+STUDY: dict[str, Any] = {
+    "study": "mine",
+    "tasks": ["grasp", "turn"],
+    "aois": [{"name": "robot", "rectangle": [0, 0, 0.5, 1]}, {"name": "cup", "rectangle": [0.5, 0, 1, 1]}],
+    "conditions": {"control": {"learner": {"name": "scoring"}}, "adaptive": {}},
+}
+
+PLAIN, NEGATED = {"negation": "affirmation", "hesitation": "none"}, {"negation": "negation", "hesitation": "none"}
+
+
+def problem(answer: httpx.Response, status: int) -> dict[str, Any]:
+    """The problem document of an answer, which has its shape."""
+    assert answer.status_code == status, answer.text[:500]
+    assert answer.headers["content-type"] == "application/problem+json"
+    found: dict[str, Any] = answer.json()
+    assert found.keys() == {"type", "title", "status", "detail", "errors"}
+    assert found["status"] == status
+    assert all(isinstance(found[name], str) and found[name] for name in ("type", "title", "detail"))
+    for error in found["errors"]:
+        assert error.keys() == {"field", "value", "rule"}
+        assert len(error["field"]) <= 80
+        assert len(error["value"]) <= 80
+    assert len(answer.content) < 16_000, "no echo of long input"
+    return found

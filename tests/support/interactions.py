@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mcap.reader import make_reader
-from mesh import LiveMesh
 from shift_runtime.rest_client import RestClient
 from shift_schemas.keys import OWNER_OF
-from shift_schemas.study_text import study_of
-from shift_simulator.events import play
 from shift_simulator.live import LiveEpisode, drive
+from shift_simulator.session import play
 from shift_simulator.users import paper_user
+from shift_study.loading import study_of
+
+from support.whole_mesh import LiveMesh
 
 STUDY = {"study": "interactions", "interactions": 100, "decider": {"wait_s": 30}}
 """A decision waits for all that it must have seen: so that a restart changes nothing."""

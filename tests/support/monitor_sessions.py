@@ -24,9 +24,9 @@ from shift_schemas.messages import (
     TripleView,
     Versions,
 )
-from shift_schemas.stamps import Stamp
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_json, study_of
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import study_json, study_of
+from shift_study.study import Study
 
 NOW = Stamp(sec=1_700_000_000, nsec=0)
 RECORDINGS = sorted((Path(__file__).parents[1] / "data" / "gaze").glob("*.tsv.gz"))

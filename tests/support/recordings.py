@@ -8,14 +8,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from shift_recorder.finishing import FinishedRecording, finish_recording
-from shift_recorder.mcap_schemas import recorded_json, subject_schemas
-from shift_recorder.parsing import Attachment
-from shift_recorder.segments import SegmentWriter
+from shift_recording.mcap.records import Attachment
+from shift_recording.mcap.schemas import recorded_json, subject_schemas
+from shift_recording.merging import FinishedRecording, finish_recording
+from shift_recording.segments import SegmentWriter
 from shift_schemas.keys import OWNER_OF
 from shift_schemas.messages import Decision, Fact, Gaze, Marker, TripleView, Versions
-from shift_schemas.stamps import Stamp
-from shift_schemas.study import Study
+from shift_schemas.timestamps import Stamp
+from shift_study.study import Study
 
 START = 1_700_000_000_000_000_000
 SCHEMAS = subject_schemas(Study(study="coffee"))

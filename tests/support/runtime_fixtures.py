@@ -8,9 +8,9 @@ import socket
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from shift_runtime.bus import Bus
+from shift_runtime.bus.protocol import Bus
 from shift_schemas.messages import Marker, OutboxRow
-from shift_schemas.stamps import Stamp
+from shift_schemas.timestamps import Stamp
 
 SOON_S = 10.0
 """Nothing here takes that long; a test that waits so long has failed."""

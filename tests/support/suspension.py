@@ -1,7 +1,8 @@
 """Suspending a process of a running mesh under traffic, and counting what became of what was answered.
 
-``python tests/faults/suspended.py --times 5`` (``make campaign-suspend``) stops each of the six processes for 2, 12 and
-30 s, five times each, and prints how long it took until everything worked again, and what ``/readyz`` said meanwhile.
+``python tests/support/suspension.py --times 5`` (``make campaign-suspend``) stops each of the six processes for 2, 12
+and 30 s, five times each, and prints how long it took until everything worked again, and what ``/readyz`` said
+meanwhile.
 Used by test_suspended.py, which does a little of it.
 """
 
@@ -21,11 +22,12 @@ from typing import Any
 import httpx
 
 if __name__ == "__main__":
-    sys.path.insert(0, str(Path(__file__).parents[1] / "e2e"))
+    sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from mesh import LiveMesh, running_mesh
-from shift_recorder.reading import Recording
-from shift_recorder.verify import verify
+from shift_recording.mcap.reader import Recording
+from shift_verify.verify import verify
+
+from support.whole_mesh import LiveMesh, running_mesh
 
 PROCESSES = (
     "shift_runtime.router", "shift_recorder", "shift_monitor", "shift_decider", "shift_learner", "shift_gateway",

@@ -18,15 +18,16 @@ from shift_decider import core as decider
 from shift_learner import core as learner
 from shift_monitor import core as monitor
 from shift_recorder import core as recorder
-from shift_recorder.checksum import sha256_of, write_checksum
-from shift_recorder.finishing import finish_recording
-from shift_recorder.front import attachments_of, metadata_of
-from shift_recorder.mcap_schemas import recorded_json, subject_schemas
-from shift_recorder.parsing import Attachment
-from shift_recorder.reading import RecordedMessage, Recording
-from shift_recorder.segments import SegmentWriter
-from shift_recorder.storage import DurableFile
-from shift_recorder.writing import RecordingWriter
+from shift_recording.checksum import sha256_of, write_checksum
+from shift_recording.durable_file import DurableFile
+from shift_recording.mcap.reader import RecordedMessage, Recording
+from shift_recording.mcap.records import Attachment
+from shift_recording.mcap.schemas import recorded_json, subject_schemas
+from shift_recording.mcap.writer import RecordingWriter
+from shift_recording.merging import finish_recording
+from shift_recording.provenance import attachments_of, metadata_of
+from shift_recording.segments import SegmentWriter
+from shift_schemas.core_protocol import NotYet
 from shift_schemas.keys import READS
 from shift_schemas.messages import (
     Command,
@@ -42,8 +43,7 @@ from shift_schemas.messages import (
     SetOverride,
     StartSession,
 )
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet
+from shift_schemas.timestamps import Stamp
 
 CORES: dict[str, Callable[..., Any]] = {
     "recorder": recorder.step, "monitor": monitor.step, "decider": decider.step, "learner": learner.step,
@@ -216,14 +216,14 @@ class Session:
     def metadata(self) -> dict[str, dict[str, str]]:
         """As the recorder's shell writes it."""
         state: recorder.RecorderState = self.states["recorder"]
-        return metadata_of(state)
+        return metadata_of(state.fact, state.config)
 
     def attachments(self) -> list[Attachment]:
         """As the recorder's shell writes them."""
         state: recorder.RecorderState = self.states["recorder"]
         policies = [recorded_json(fact) for subject, _, fact in self.recorded if subject == "policy"]
         ends = (policies[0], policies[-1]) if policies else None
-        files = attachments_of(state, ends)
+        files = attachments_of(state.config, state.original, ends)
         return [Attachment(name, "application/json", data, START) for name, data in files.items()]
 
 

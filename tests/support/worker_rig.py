@@ -9,14 +9,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from runtime_fixtures import until
-from shift_runtime.bus import Bus, Handle, Incoming, Reply, Request
+from shift_runtime.bus.memory import Hub, MemoryBus
+from shift_runtime.bus.protocol import Bus, Handle, Incoming, Reply, Request
 from shift_runtime.clock import ManualClock
 from shift_runtime.journal import Batch, Journal
-from shift_runtime.memory_bus import Hub, MemoryBus
 from shift_runtime.metrics import Metrics
-from shift_runtime.worker import Core, Worker
+from shift_runtime.service.loop import Core, Worker
 from shift_schemas.codec import decode, encode
+from shift_schemas.core_protocol import NotYet, Step
 from shift_schemas.errors import Problem, Unavailable, UnknownThing
 from shift_schemas.keys import CommandKey, FactKey, ServiceKey, build_key
 from shift_schemas.messages import (
@@ -33,8 +33,9 @@ from shift_schemas.messages import (
     Seen,
     Session,
 )
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet, Step
+from shift_schemas.timestamps import Stamp
+
+from support.runtime_fixtures import until
 
 WAIT_S = 0.15
 

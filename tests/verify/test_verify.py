@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from shift_recorder.checksum import checksum_path
-from shift_recorder.reading import RecordedMessage, Recording
-from shift_recorder.rerecording import merge_patch_between
-from shift_recorder.verify import verify
+from shift_recording.checksum import checksum_path
+from shift_recording.mcap.reader import RecordedMessage, Recording
 from shift_schemas.errors import UnknownThing
-from shift_schemas.study import merge_patch
-from verify_sessions import Edit, Session, changed, rewritten, without
+from shift_study.study import merge_patch
+from shift_verify.recorder import merge_patch_between
+from shift_verify.verify import verify
+from support.verify_sessions import Edit, Session, changed, rewritten, without
 
 SCORING = {"learner": {"name": "scoring"}}
 

@@ -9,7 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from rich.table import Table
-    from shift_recorder.info import RecordingInfo
+    from shift_recording.summary import RecordingInfo
 
 
 def info(
@@ -27,7 +27,7 @@ def info(
     import json
 
     from rich.console import Console
-    from shift_recorder.info import info_of
+    from shift_recording.summary import info_of
 
     found = info_of(file)
     if as_json:

@@ -9,7 +9,7 @@ import typer
 from shift_schemas.keys import SUBJECTS
 
 if TYPE_CHECKING:
-    from shift_recorder.replay import Extent, Pacer, Publish, Replay
+    from shift_recording.replay import Extent, Pacer, Publish, Replay
 
 LISTEN = "tcp/127.0.0.1:0"
 """As a peer: a session that listens nowhere waits for its router for ever."""
@@ -53,7 +53,7 @@ def replay(
     """
     import asyncio
 
-    from shift_recorder.replay import Replay, extent_of, replay_session
+    from shift_recording.replay import Replay, extent_of, replay_session
     from shift_schemas.errors import Conflict
 
     extent = extent_of(file, longest_pause)
@@ -77,8 +77,8 @@ async def _run(plan: Replay, extent: Extent, zenoh: str, start_paused: bool) -> 
     import contextlib
     import signal
 
-    from shift_recorder.replay import Pacer, check_free
-    from shift_runtime.zenoh_bus import ZenohBus
+    from shift_recording.replay import Pacer, check_free
+    from shift_runtime.bus.zenoh import ZenohBus
 
     bus = await ZenohBus.open(zenoh, LISTEN)
     loop = asyncio.get_running_loop()
@@ -123,7 +123,7 @@ def _waiting_put(bus: Any) -> Publish:
 async def _playing(bus: Any, plan: Replay, extent: Extent, pacer: Pacer, counted: list[int]) -> int:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-    from shift_recorder.replay import play
+    from shift_recording.replay import play
 
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.1f} of {task.total:.1f} s"))
     with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bar:

@@ -9,7 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from rich.table import Table
-    from shift_runtime.studies import CheckedStudy
+    from shift_runtime.study_files import CheckedStudy
 
 app = typer.Typer(
     no_args_is_help=True, add_completion=False, rich_markup_mode="rich", help="Check, show and list studies."
@@ -34,7 +34,7 @@ def check(
     shift-mesh study check data/studies/coffee.yaml
     shift-mesh study check my-study.yaml --json | jq .mistakes
     """
-    from shift_runtime.studies import check_file
+    from shift_runtime.study_files import check_file
 
     found = check_file(file, str(file))
     if as_json:
@@ -59,10 +59,10 @@ def show(
     shift-mesh study show coffee > data/studies/mine.yaml     # a copy with every value to change
     shift-mesh study show my-study --data /srv/shift --json
     """
-    from shift_runtime.studies import find_study, unknown_study
+    from shift_runtime.study_files import find_study, unknown_study
     from shift_schemas.errors import UnknownThing
-    from shift_schemas.study_text import study_data
-    from shift_schemas.study_yaml import write_yaml
+    from shift_study.loading import study_data
+    from shift_study.yaml_reader import write_yaml
 
     folder = data / "studies"
     found = find_study(name, folder)
@@ -88,7 +88,7 @@ def list_(data: Data = Path("data"), as_json: Json = False) -> None:
     shift-mesh study list
     shift-mesh study list --data /srv/shift --json
     """
-    from shift_runtime.studies import list_studies
+    from shift_runtime.study_files import list_studies
 
     folder = data / "studies"
     if not folder.is_dir():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from shift_recorder.verify import VerifyReport
+    from shift_verify.verify import VerifyReport
 
 
 def verify(
@@ -27,7 +27,7 @@ def verify(
 
     from rich.console import Console
     from rich.progress import Progress
-    from shift_recorder.verify import verify as verify_recording
+    from shift_verify.verify import verify as verify_recording
 
     with Progress(console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal) as bar:
         task = bar.add_task(f"verifying {file.name}", total=None)

@@ -12,8 +12,10 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from pydantic import TypeAdapter
+from shift_model.random_numbers import pick, uniform
+from shift_model.vocabulary import PolicySource, Triple
+from shift_schemas.core_protocol import NotYet, Step, covers_gaze
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
-from shift_schemas.hints import did_you_mean
 from shift_schemas.messages import (
     Command,
     Config,
@@ -31,13 +33,11 @@ from shift_schemas.messages import (
     Strategy,
     Versions,
 )
-from shift_schemas.randomness import pick, uniform
-from shift_schemas.scoring import Reduction, reductions, view
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet, Step, covers_gaze
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_from_json
-from shift_schemas.words import PolicySource, Triple
+from shift_schemas.suggestions import did_you_mean
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import study_from_json
+from shift_study.scoring import Reduction, reductions, view
+from shift_study.study import Study
 
 ANY_TASK = ""
 """The task of the estimate that stands for every task without results."""

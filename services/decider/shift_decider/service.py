@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shift_runtime.worker import Core
+from shift_runtime.service.loop import Core
 from shift_schemas.keys import READS
 
 from shift_decider import core

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from fastapi import FastAPI, Query, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse, StreamingResponse
 from pydantic import BaseModel
-from shift_runtime.bus import Bus
+from shift_runtime.bus.protocol import Bus
 from shift_runtime.clock import Clock
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
@@ -22,8 +22,8 @@ from shift_schemas.messages import Fact, GazeChunk, Health
 
 from shift_gateway import bodies
 from shift_gateway.docs_page import add_docs
-from shift_gateway.door import Door
-from shift_gateway.gathering import gathered
+from shift_gateway.gateway_api import Door
+from shift_gateway.merged_metrics import gathered
 from shift_gateway.origins import Rules
 from shift_gateway.page import PAGE, PAGE_POLICY
 from shift_gateway.paths import GatewayApp
@@ -39,7 +39,7 @@ from shift_gateway.problems import (
 )
 from shift_gateway.readiness import readiness
 from shift_gateway.recordings import list_recordings, recording_path
-from shift_gateway.replica import Replica
+from shift_gateway.session_views import Replica
 from shift_gateway.settings import GatewaySettings
 from shift_gateway.studies import add_studies
 

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from shift_schemas.bodies import DecisionBody, MarkerBody, OverrideBody, PatchBody, PerformanceBody, StartBody
+from shift_schemas.requests import DecisionBody, MarkerBody, OverrideBody, PatchBody, PerformanceBody, StartBody
 
 __all__ = ["DecisionBody", "MarkerBody", "OverrideBody", "PatchBody", "PerformanceBody", "StartBody"]

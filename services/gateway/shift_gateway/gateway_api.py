@@ -11,14 +11,14 @@ from typing import Any
 
 from shift_decider.core import ANY_TASK, decided
 from shift_runtime.clock import Clock
-from shift_runtime.door import READ_WAIT_S, CommandDoor
+from shift_runtime.mesh_api import READ_WAIT_S, CommandDoor
 from shift_runtime.mesh_client import MeshClient
+from shift_schemas.core_protocol import NotYet, covers
 from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, shorten
 from shift_schemas.messages import Observation, Seen, Session
-from shift_schemas.stamps import NS
-from shift_schemas.step import NotYet, covers
+from shift_schemas.timestamps import NS
 
-from shift_gateway.replica import Replica, View, decider_state
+from shift_gateway.session_views import Replica, View, decider_state
 
 PREVIEW_ID = "preview"
 

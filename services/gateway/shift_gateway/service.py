@@ -7,12 +7,12 @@ import sys
 
 import structlog
 import uvicorn
-from shift_runtime.bus import Bus
+from shift_runtime.bus.protocol import Bus
+from shift_runtime.bus.zenoh import ZenohBus
 from shift_runtime.clock import SystemClock
 from shift_runtime.logs import configure_logs
 from shift_runtime.process import leave
 from shift_runtime.settings import read_settings
-from shift_runtime.zenoh_bus import ZenohBus
 from shift_schemas.errors import ShiftError
 
 from shift_gateway.app import make_app

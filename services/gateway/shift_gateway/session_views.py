@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shift_decider.core import DeciderState
-from shift_runtime.replica import HINT_WAIT_S, Replica, View
+from shift_runtime.read_model import HINT_WAIT_S, Replica, View
 
 __all__ = ["HINT_WAIT_S", "Replica", "View", "decider_state"]
 

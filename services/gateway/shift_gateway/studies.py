@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
-from shift_runtime.studies import CheckedStudy, find_study, list_studies, unknown_study
+from shift_runtime.study_files import CheckedStudy, find_study, list_studies, unknown_study
 from shift_schemas.errors import FieldError, UnknownThing, shorten
-from shift_schemas.study_text import study_data
+from shift_study.loading import study_data
 
 
 def add_studies(app: FastAPI, folder: Path) -> None:

@@ -13,6 +13,9 @@ from functools import lru_cache
 from typing import Any
 
 from pydantic import TypeAdapter
+from shift_model.reward import reward, task_performance
+from shift_model.vocabulary import Triple
+from shift_schemas.core_protocol import NotYet, Step
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
 from shift_schemas.messages import (
     Command,
@@ -24,20 +27,18 @@ from shift_schemas.messages import (
     PolicyRow,
     ReportPerformance,
     Result,
+    ScoredResult,
     Seen,
     Session,
     SessionState,
     Transition,
     Versions,
 )
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet, Step
-from shift_schemas.study_text import study_from_json
-from shift_schemas.words import Triple
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import study_from_json
 
 from shift_learner.learner import Context, Learner, Taken, state_names, state_of
 from shift_learner.learners import learner_named
-from shift_learner.reward import reward, task_performance
 
 WAIT_S = 2.0
 """How long a report waits for its decision or configuration to come in; chosen, as the decider's."""
@@ -282,9 +283,9 @@ def _performance(
 ) -> Performance:
     """The report as it is recorded; ``before`` is the one that it replaces."""
     settings = _context(state).study.reward
-    comprehension = task_performance(command.comprehension, settings)
-    enabledness = task_performance(command.enabledness, settings)
-    gained = reward(comprehension.value, enabledness.value, settings)
+    comprehension = _scored(command.comprehension, settings.decay)
+    enabledness = _scored(command.enabledness, settings.decay)
+    gained = reward(comprehension.value, enabledness.value, settings.scale)
     return Performance(
         session=state.session, stamp=now, seen=_seen(state), decision_id=command.decision_id,
         task=task, n=state.performances + 1, comprehension=comprehension, enabledness=enabledness, reward=gained,
@@ -366,3 +367,8 @@ def _context(state: LearnerState) -> Context:
 
 def _learner(state: LearnerState) -> Learner:
     return learner_named(_context(state).study.learner.name)
+
+
+def _scored(result: Result, decay: float) -> ScoredResult:
+    value = task_performance(result.success, result.duration_s, decay)
+    return ScoredResult(success=result.success, duration_s=result.duration_s, value=value)

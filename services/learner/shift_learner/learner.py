@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
-from shift_schemas.scoring import suggestions
-from shift_schemas.study import Study
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
+from shift_study.scoring import suggestions
+from shift_study.study import Study
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from shift_schemas.stamps import NS
-from shift_schemas.study import AttentionSettings
-from shift_schemas.words import GazeClass
+from shift_model.vocabulary import GazeClass
+from shift_schemas.timestamps import NS
+from shift_study.study import AttentionSettings
 
 from shift_monitor.areas import NOWHERE
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
+from shift_model.vocabulary import AwarenessClass
 from shift_schemas.messages import AwarenessView, Performance
-from shift_schemas.study import AwarenessSettings
-from shift_schemas.words import AwarenessClass
+from shift_study.study import AwarenessSettings
 
 HISTORY_LENGTH = 10_000
-"""The largest ``awareness.window`` of a study (shift_schemas.study)."""
+"""The largest ``awareness.window`` of a study (shift_study.study)."""
 
 MARGIN = 1e-9
 """Chosen, as for the other classes: a ratio this close to the threshold is at it."""

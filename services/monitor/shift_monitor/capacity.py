@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from shift_model.vocabulary import CapacityClass
 from shift_schemas.messages import Strategy
-from shift_schemas.study import CapacitySettings
-from shift_schemas.words import CapacityClass
+from shift_study.study import CapacitySettings
 
 MARGIN = 1e-9
 """Chosen: a value this close to a threshold is at it, so that sums of 0.1 classify as on paper (MODEL.md)."""

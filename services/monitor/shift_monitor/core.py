@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pydantic import TypeAdapter
+from shift_schemas.core_protocol import NotYet, Step
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
 from shift_schemas.messages import (
     CapacityView,
@@ -28,28 +29,17 @@ from shift_schemas.messages import (
     Seen,
     Session,
 )
-from shift_schemas.stamps import NS, Stamp
-from shift_schemas.step import NotYet, Step
+from shift_schemas.timestamps import NS, Stamp
 
 from shift_monitor.areas import area_at
 from shift_monitor.attention import Attention, fresh, gaze_class, interrupted
 from shift_monitor.awareness import History, awareness_views, corrected, reported
 from shift_monitor.capacity import Capacity, capacity_class, executed
+from shift_monitor.chunk_sequence import Arrival, Numbering, arrival, began_anew, read, skipped
 from shift_monitor.fixation import Found, ended
 from shift_monitor.gaze_account import broken_off, shares
 from shift_monitor.gaze_input import GazeInput, is_repeat
-from shift_monitor.gaze_warnings import (
-    clock_restart_warning,
-    jump_warnings,
-    late_warning,
-    next_spacings,
-    number_restart_warning,
-    rate_warnings,
-    share_warnings,
-)
-from shift_monitor.numbering import Arrival, Numbering, arrival, began_anew, read, skipped
-from shift_monitor.plan import Plan, name_of, plan_of
-from shift_monitor.stream import (
+from shift_monitor.gaze_stream import (
     IDLE,
     NO_TIME,
     Stream,
@@ -60,6 +50,16 @@ from shift_monitor.stream import (
     points_applied,
     recorded_columns,
 )
+from shift_monitor.gaze_warnings import (
+    clock_restart_warning,
+    jump_warnings,
+    late_warning,
+    next_spacings,
+    number_restart_warning,
+    rate_warnings,
+    share_warnings,
+)
+from shift_monitor.prepared_study import Plan, name_of, plan_of
 
 CONFIG_WAIT_S = 0.2
 """How long gaze waits for the session's configuration: it is a stream (DESIGN.md, "Read your own writes")."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 from math import atan, degrees
 from typing import NamedTuple
 
-from shift_schemas.stamps import NS
-from shift_schemas.study import FixationSettings
+from shift_schemas.timestamps import NS
+from shift_study.study import FixationSettings
 
 from shift_monitor.median import EMPTY, Filter, Point, came_out, flushed, stood, taken
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from shift_schemas.messages import Fact, Gaze, GazeChunk
 
-from shift_monitor.stream import recorded_columns
+from shift_monitor.gaze_stream import recorded_columns
 
 Recall = Callable[..., Iterable[Fact]]
 """``recall(subject, **fields)``: the session's own facts of a subject whose fields have these values."""

@@ -10,18 +10,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from shift_schemas.errors import FieldError, MalformedMessage, shorten
-from shift_schemas.hints import did_you_mean
 from shift_schemas.messages import GazeChunk
-from shift_schemas.stamps import NS
+from shift_schemas.suggestions import did_you_mean
+from shift_schemas.timestamps import NS
 
 from shift_monitor.areas import NOWHERE, area_at
 from shift_monitor.attention import Attention, Dwell, dwelt, met_aoi
+from shift_monitor.chunk_sequence import Numbering
 from shift_monitor.fixation import Detector, Found, Output, fed
 from shift_monitor.gaze_account import LOST, OFF_STIMULUS, ON_STIMULUS, GazeAccount
 from shift_monitor.gaze_account import counted as time_counted
 from shift_monitor.gaze_account import dwelt as account_dwelt
-from shift_monitor.numbering import Numbering
-from shift_monitor.plan import Plan
+from shift_monitor.prepared_study import Plan
 
 LEAST_COORDINATE, LARGEST_COORDINATE = -1.0, 2.0
 """Chosen: gaze up to one stimulus beside the stimulus is gaze; beyond, the unit is wrong or the sample lost."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 from statistics import median_low
 
-from shift_schemas.stamps import NS
+from shift_schemas.timestamps import NS
 
 from shift_monitor.gaze_account import JUMP_NS, GazeAccount, shares
 

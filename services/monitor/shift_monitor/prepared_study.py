@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-from shift_schemas.stamps import NS
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_from_json
+from shift_schemas.timestamps import NS
+from shift_study.loading import study_from_json
+from shift_study.study import Study
 
 from shift_monitor.areas import NOWHERE, Area, area_of
 from shift_monitor.fixation import Rule, rule_of

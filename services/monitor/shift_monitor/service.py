@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shift_runtime.worker import Core, Recall
+from shift_runtime.service.loop import Core, Recall
 from shift_schemas.keys import READS
 from shift_schemas.messages import GazeChunk
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from pydantic import TypeAdapter
+from shift_schemas.core_protocol import Step
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, UnknownThing
 from shift_schemas.messages import (
     MOST_WARNINGS,
@@ -25,10 +26,9 @@ from shift_schemas.messages import (
     Session,
     StartSession,
 )
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import Step
-from shift_schemas.study import Study, fixed_changes
-from shift_schemas.study_text import patched, study_data, study_from_json, study_in_force, study_json, study_of
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import patched, study_data, study_from_json, study_in_force, study_json, study_of
+from shift_study.study import Study, fixed_changes
 
 
 class FinishSession(EndSession):

@@ -21,26 +21,26 @@ from pathlib import Path
 from typing import Any
 
 import structlog
-from shift_runtime.bus import Incoming
+from shift_recording.durable_file import StorageFailed
+from shift_recording.mcap.reader import Recording
+from shift_recording.mcap.records import Attachment
+from shift_recording.mcap.schemas import recorded_json, subject_schemas
+from shift_recording.merging import FinishedRecording, finish_recording
+from shift_recording.provenance import attachments_of, metadata_of
+from shift_recording.segments import SegmentWriter, segments_of
+from shift_runtime.bus.protocol import Incoming
 from shift_runtime.journal import Batch
 from shift_runtime.reader import ReadFact
+from shift_runtime.service.loop import Asked, Core, Worker, _Turn
 from shift_runtime.settings import MeshSettings
-from shift_runtime.studies import study_to_start
-from shift_runtime.worker import Asked, Core, Worker, _Turn
+from shift_runtime.study_files import study_to_start
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, ShiftError, Unavailable
 from shift_schemas.keys import OWNERS, READS, ROOT, FactKey, StreamKey, parse_key
 from shift_schemas.messages import END_ID, Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
-from shift_schemas.study_text import study_from_json
+from shift_study.loading import study_from_json
 
 from shift_recorder import core
 from shift_recorder.core import FinishSession, RecorderState
-from shift_recorder.finishing import FinishedRecording, finish_recording
-from shift_recorder.front import attachments_of, metadata_of
-from shift_recorder.mcap_schemas import recorded_json, subject_schemas
-from shift_recorder.parsing import Attachment
-from shift_recorder.reading import Recording
-from shift_recorder.segments import SegmentWriter, segments_of
-from shift_recorder.storage import StorageFailed
 
 log = structlog.get_logger()
 
@@ -348,10 +348,10 @@ class RecorderWorker(Worker[RecorderState]):
             sources,
             target,
             schemas=subject_schemas(study_from_json(state.config.study), _states_of(policies)),
-            metadata=metadata_of(state),
+            metadata=metadata_of(state.fact, state.config),
             attachments=[
                 Attachment(name, "application/json", data, state.fact.started.ns)
-                for name, data in attachments_of(state, policies).items()
+                for name, data in attachments_of(state.config, state.original, policies).items()
             ],
         )
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from shift_schemas.errors import DamagedRecording, UnknownThing, shorten
 
-from shift_recorder.storage import DurableFile, replace
+from shift_recording.durable_file import DurableFile, replace
 
 _LINE = re.compile(r"([0-9a-f]{64}) [ *].+\n?")
 

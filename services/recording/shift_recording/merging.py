@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from shift_schemas.errors import Conflict, DamagedRecording, shorten
 from shift_schemas.keys import OWNER_OF, OWNERS, SUBJECTS
 
-from shift_recorder.checksum import checksum_path, sha256_of, write_checksum
-from shift_recorder.parsing import Attachment, message_at
-from shift_recorder.reading import Recording, Report, chunk_at
-from shift_recorder.storage import DurableFile, make_folder, replace, storage_errors, sync_folder
-from shift_recorder.writing import SESSION_METADATA, RecordingWriter
+from shift_recording.checksum import checksum_path, sha256_of, write_checksum
+from shift_recording.durable_file import DurableFile, make_folder, replace, storage_errors, sync_folder
+from shift_recording.mcap.reader import Recording, Report, chunk_at
+from shift_recording.mcap.records import Attachment, message_at
+from shift_recording.mcap.writer import SESSION_METADATA, RecordingWriter
 
 CHUNK_BYTES = 2 * 2**20
 """Large chunks pack better and make short indexes; Foxglove fetches a chunk at a time. Chosen: 1 to 4 MB."""

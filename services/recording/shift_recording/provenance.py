@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import json
 
-from shift_schemas.stamps import Stamp
+from shift_schemas.messages import Config, Session
+from shift_schemas.timestamps import Stamp
 
-from shift_recorder.core import RecorderState
-from shift_recorder.writing import CONFIG_METADATA, SESSION_METADATA
+from shift_recording.mcap.writer import CONFIG_METADATA, SESSION_METADATA
 
 STUDY = "study.json"
 """The attachment with the study as it was given, before its condition."""
 
 
-def metadata_of(state: RecorderState) -> dict[str, dict[str, str]]:
+def metadata_of(fact: Session, config: Config) -> dict[str, dict[str, str]]:
     """The metadata records, by name; stamps are seconds since the epoch, '' is none."""
-    fact = state.fact
     return {
         SESSION_METADATA: {
             "session": fact.session,
@@ -32,14 +31,14 @@ def metadata_of(state: RecorderState) -> dict[str, dict[str, str]]:
             "software": f"shift-mesh/{fact.software}",
             "revision": fact.revision,
         },
-        CONFIG_METADATA: {"version": str(state.config.version), "study": state.config.study},
+        CONFIG_METADATA: {"version": str(config.version), "study": config.study},
     }
 
 
-def attachments_of(state: RecorderState, policies: tuple[bytes, bytes] | None) -> dict[str, bytes]:
+def attachments_of(config: Config, original: str, policies: tuple[bytes, bytes] | None) -> dict[str, bytes]:
     """The attached JSON files, by name; ``policies`` are the first and the last one, as recorded."""
-    table = json.loads(state.config.study)["scoring"]["table"]
-    files = {STUDY: state.original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
+    table = json.loads(config.study)["scoring"]["table"]
+    files = {STUDY: original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
     return files | dict(zip(("policy-first.json", "policy-last.json"), policies or (), strict=False))
 
 

@@ -14,17 +14,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from shift_runtime.bus import Bus
+from shift_runtime.bus.protocol import Bus
 from shift_runtime.reader import REPLAY_MARK
 from shift_schemas.codec import decode, encode, encoding_of
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, shorten
-from shift_schemas.hints import did_you_mean
 from shift_schemas.ids import is_id, not_an_id
 from shift_schemas.keys import SUBJECTS, FactKey, ServiceKey, build_key
 from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, Session
-from shift_schemas.stamps import NS
+from shift_schemas.suggestions import did_you_mean
+from shift_schemas.timestamps import NS
 
-from shift_recorder.reading import RecordedFact, Recording, recorded_fact
+from shift_recording.mcap.reader import RecordedFact, Recording, recorded_fact
 
 LONGEST_ID = 63
 LONGEST_PAUSE_S = 10.0
@@ -34,7 +34,7 @@ Progress = Callable[[float, int], None]
 
 
 class Publish(Protocol):
-    """How a fact is put on a bus: :meth:`shift_runtime.bus.Bus.put`, or one that rather waits than drops."""
+    """How a fact is put on a bus: :meth:`shift_runtime.bus.protocol.Bus.put`, or one that rather waits than drops."""
 
     def __call__(self, key: str, payload: bytes, /, *, encoding: str = "", attachment: bytes = b"") -> None:
         """Publish."""

@@ -14,8 +14,8 @@ from pathlib import Path
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.ids import is_id, not_an_id
 
-from shift_recorder.storage import DurableFile, StorageFailed, make_folder, sync_folder
-from shift_recorder.writing import SESSION_METADATA, RecordingWriter
+from shift_recording.durable_file import DurableFile, StorageFailed, make_folder, sync_folder
+from shift_recording.mcap.writer import SESSION_METADATA, RecordingWriter
 
 CHUNK_BYTES = 2**20
 """A chunk ends here at the latest; with a flush each second it ends long before."""

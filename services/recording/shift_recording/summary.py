@@ -11,11 +11,11 @@ from typing import Any
 
 from shift_schemas.errors import DamagedRecording, MalformedMessage
 from shift_schemas.messages import Session
-from shift_schemas.stamps import NS
+from shift_schemas.timestamps import NS
 
-from shift_recorder.checksum import check
-from shift_recorder.reading import Recording, fact_of
-from shift_recorder.writing import SESSION_METADATA
+from shift_recording.checksum import check
+from shift_recording.mcap.reader import Recording, fact_of
+from shift_recording.mcap.writer import SESSION_METADATA
 
 
 @dataclass(frozen=True)

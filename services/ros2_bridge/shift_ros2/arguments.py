@@ -15,7 +15,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
 from shift_schemas.errors import InvalidSettings, shorten
-from shift_schemas.yaml_core import core_value
+from shift_study.yaml_numbers import core_value
 
 from shift_ros2.names import Remap, check_namespace, check_node
 

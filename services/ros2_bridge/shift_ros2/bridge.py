@@ -13,20 +13,20 @@ from functools import partial
 
 import structlog
 from shift_runtime.clock import Clock
-from shift_runtime.door import READ_WAIT_S, CommandDoor, new_id
+from shift_runtime.mesh_api import READ_WAIT_S, CommandDoor, new_id
 from shift_runtime.metrics import Metrics
-from shift_schemas.bodies import MarkerBody, StartBody
 from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import Decision, Fact
+from shift_schemas.requests import MarkerBody, StartBody
 
 from shift_ros2 import mapping
 from shift_ros2.backend import Answer, Backend
+from shift_ros2.command_queue import Reports
 from shift_ros2.diagnostics import Diagnostics
+from shift_ros2.gaze_forwarder import GazeSender
 from shift_ros2.interfaces import PUBLISHED
 from shift_ros2.mapping import GazeArrival
-from shift_ros2.reports import Reports
 from shift_ros2.ros4hri import Persons
-from shift_ros2.sender import GazeSender
 from shift_ros2.settings import BridgeSettings
 
 log = structlog.get_logger()

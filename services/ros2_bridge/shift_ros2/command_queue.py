@@ -10,7 +10,7 @@ from typing import Any
 import structlog
 from shift_schemas.errors import ShiftError, Unavailable
 
-from shift_ros2.progress import Progress
+from shift_ros2.completion import Progress
 
 log = structlog.get_logger()
 Work = Callable[[], Awaitable[Any]]

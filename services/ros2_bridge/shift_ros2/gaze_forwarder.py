@@ -7,12 +7,12 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 
 import structlog
-from shift_runtime.door import CommandDoor
+from shift_runtime.mesh_api import CommandDoor
 from shift_schemas.errors import MalformedMessage, ShiftError, Unavailable
 
-from shift_ros2.gathering import SOURCES, Lane, joined
+from shift_ros2.completion import Progress
+from shift_ros2.gaze_batching import SOURCES, Lane, joined
 from shift_ros2.mapping import GazeArrival
-from shift_ros2.progress import Progress
 from shift_ros2.settings import BridgeSettings
 
 log = structlog.get_logger()

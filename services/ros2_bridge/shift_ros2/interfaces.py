@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from shift_ros2.wire import STRING, TRIGGER, RosType
+from shift_ros2.rmw_zenoh import STRING, TRIGGER, RosType
 
 Direction = Literal["in", "out", "service"]
 Topic = Literal[

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from pydantic_core import to_json
-from shift_schemas.bodies import PerformanceBody
 from shift_schemas.errors import (
     FieldError,
     MalformedMessage,
@@ -24,6 +23,7 @@ from shift_schemas.errors import (
 )
 from shift_schemas.ids import Id
 from shift_schemas.messages import Fact, GazeChunk, Message, Observation
+from shift_schemas.requests import PerformanceBody
 from shift_schemas.strict_json import parse_json
 
 TEXT_LIMIT = 256 * 1024

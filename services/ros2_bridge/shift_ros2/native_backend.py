@@ -16,16 +16,16 @@ from itertools import count
 from typing import Any
 
 import zenoh
-from shift_runtime.zenoh_bus import direct
-from shift_runtime.zenoh_config import zenoh_config
+from shift_runtime.bus.zenoh import direct
+from shift_runtime.bus.zenoh_config import zenoh_config
 from shift_schemas.errors import InvalidSettings, MalformedMessage, Problem, ShiftError, shorten
 
 from shift_ros2 import cdr, ros4hri
 from shift_ros2.backend import Handlers, Inbox, answer_of, stopped
 from shift_ros2.interfaces import INTERFACES, Interface
+from shift_ros2.rmw_zenoh import Attachment, Node, RosType, data_key, gid_of, hash_of, qos_text
 from shift_ros2.ros4hri import ENGAGEMENT, ENGAGEMENT_LEVEL, IDS_LIST, TRACKED
 from shift_ros2.settings import BridgeSettings
-from shift_ros2.wire import Attachment, Node, RosType, data_key, gid_of, hash_of, qos_text
 
 OVERRIDE = "ZENOH_CONFIG_OVERRIDE"
 """As ``rmw_zenoh`` reads it: ``path=value;path=value``, values in JSON."""

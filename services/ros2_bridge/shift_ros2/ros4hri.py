@@ -9,7 +9,7 @@ from __future__ import annotations
 from shift_schemas.errors import MalformedMessage, shorten
 
 from shift_ros2.cdr import CdrReader
-from shift_ros2.wire import RosType
+from shift_ros2.rmw_zenoh import RosType
 
 TRACKED = "/humans/persons/tracked"
 ENGAGEMENT = "/humans/persons/*/engagement_status"

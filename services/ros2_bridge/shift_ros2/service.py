@@ -9,14 +9,14 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import structlog
+from shift_runtime.bus.zenoh import ZenohBus
 from shift_runtime.clock import SystemClock
-from shift_runtime.door import CommandDoor
 from shift_runtime.logs import configure_logs
+from shift_runtime.mesh_api import CommandDoor
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
 from shift_runtime.process import run_loop
-from shift_runtime.replica import Replica
-from shift_runtime.zenoh_bus import ZenohBus
+from shift_runtime.read_model import Replica
 from shift_schemas.codec import encode
 from shift_schemas.errors import ShiftError
 from shift_schemas.keys import ServiceKey, build_key
@@ -83,7 +83,7 @@ async def open_backend(settings: BridgeSettings, bridge: Bridge) -> Backend:
         from shift_ros2.rclpy_backend import RclpyBackend
 
         return await RclpyBackend.open(settings, bridge)
-    from shift_ros2.native import NativeBackend
+    from shift_ros2.native_backend import NativeBackend
 
     return await NativeBackend.open(settings, bridge)
 

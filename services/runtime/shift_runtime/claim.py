@@ -18,9 +18,9 @@ from shift_schemas.codec import decode
 from shift_schemas.errors import InvalidSettings, MalformedMessage
 from shift_schemas.keys import ServiceKey, build_key
 from shift_schemas.messages import Health
-from shift_schemas.stamps import Stamp
+from shift_schemas.timestamps import Stamp
 
-from shift_runtime.bus import Bus, Reply
+from shift_runtime.bus.protocol import Bus, Reply
 
 JOIN_WAIT_S = 1.0
 """How long a service waits for its first link before it begins without having asked; it asks again later."""

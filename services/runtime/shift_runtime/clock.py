@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
-from shift_schemas.stamps import Stamp
+from shift_schemas.timestamps import Stamp
 
 
 class Clock(Protocol):

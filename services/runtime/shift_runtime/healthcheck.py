@@ -60,7 +60,7 @@ def _answers(host: str, port: int, path: str) -> bool:
 def _service(name: str) -> bool:
     import zenoh
 
-    from shift_runtime.zenoh_config import zenoh_config
+    from shift_runtime.bus.zenoh_config import zenoh_config
 
     config = zenoh_config("client", connect=os.environ.get("SHIFT_ZENOH", "tcp/127.0.0.1:7447"), timeout_ms=2000)
     try:

@@ -15,9 +15,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from shift_schemas.conflicts import differences
 from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
-from shift_schemas.repeats import differences
 
 from shift_runtime.claim import mesh_id
 

@@ -16,7 +16,7 @@ import structlog
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.keys import ServiceKey, build_key
 
-from shift_runtime.bus import Bus
+from shift_runtime.bus.protocol import Bus
 
 log = structlog.get_logger()
 

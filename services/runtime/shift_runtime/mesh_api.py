@@ -10,7 +10,6 @@ import secrets
 from functools import partial
 from typing import Any
 
-from shift_schemas.bodies import MarkerBody, OverrideBody, PerformanceBody, StartBody
 from shift_schemas.errors import Unavailable, UnknownThing
 from shift_schemas.messages import (
     END_ID,
@@ -26,9 +25,10 @@ from shift_schemas.messages import (
     SetOverride,
     StartSession,
 )
+from shift_schemas.requests import MarkerBody, OverrideBody, PerformanceBody, StartBody
 
 from shift_runtime.mesh_client import MeshClient
-from shift_runtime.replica import Replica, View
+from shift_runtime.read_model import Replica, View
 
 READ_WAIT_S = 2.0
 """How long a read waits for what it must have in it, at least; a study's ``wait_s`` can make it longer."""

@@ -12,14 +12,14 @@ from typing import Any, NoReturn
 import structlog
 from shift_schemas.errors import ShiftError
 
+from shift_runtime.bus.zenoh import ZenohBus
 from shift_runtime.claim import OwnedElsewhere
 from shift_runtime.clock import SystemClock
 from shift_runtime.journal import Journal
 from shift_runtime.logs import configure_logs
 from shift_runtime.metrics import Metrics
+from shift_runtime.service.loop import Core, Worker
 from shift_runtime.settings import MeshSettings, read_settings
-from shift_runtime.worker import Core, Worker
-from shift_runtime.zenoh_bus import ZenohBus
 
 log = structlog.get_logger()
 OWNED_ELSEWHERE = 3

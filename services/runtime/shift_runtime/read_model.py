@@ -24,10 +24,10 @@ from shift_schemas.messages import (
     Seen,
     Session,
 )
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_from_json
+from shift_study.loading import study_from_json
+from shift_study.study import Study
 
-from shift_runtime.bus import Bus
+from shift_runtime.bus.protocol import Bus
 from shift_runtime.reader import Reader, ReadFact
 
 HINT_WAIT_S = 0.05

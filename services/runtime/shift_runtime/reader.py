@@ -17,7 +17,7 @@ from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, build_key, parse_key
 from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxRow
 
-from shift_runtime.bus import Bus, Incoming, Reply, first_answer
+from shift_runtime.bus.protocol import Bus, Incoming, Reply, first_answer
 from shift_runtime.links import Links
 
 log = structlog.get_logger()

@@ -13,9 +13,9 @@ import threading
 import zenoh
 from shift_schemas.errors import InvalidSettings
 
+from shift_runtime.bus.zenoh_config import zenoh_config
 from shift_runtime.endpoints import parse_endpoint
 from shift_runtime.settings import DEFAULT_ROUTER
-from shift_runtime.zenoh_config import zenoh_config
 
 
 def main() -> None:

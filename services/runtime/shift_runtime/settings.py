@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from shift_schemas.errors import InvalidSettings, field_errors
-from shift_schemas.hints import did_you_mean
+from shift_schemas.suggestions import did_you_mean
 
 from shift_runtime.endpoints import parse_endpoint
 

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.hints import did_you_mean
 from shift_schemas.ids import ID_RULE, is_id, propose_id
-from shift_schemas.study import Study
-from shift_schemas.study_checks import study_warnings
-from shift_schemas.study_text import given_study, parse_study, study_data
+from shift_schemas.suggestions import did_you_mean
+from shift_study.checks import study_warnings
+from shift_study.loading import given_study, parse_study, study_data
+from shift_study.study import Study
 
 SUFFIXES = (".yaml", ".yml", ".json")
 LARGEST_BYTES = 256 * 1024

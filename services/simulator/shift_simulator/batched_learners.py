@@ -13,9 +13,9 @@ import numpy as np
 from shift_learner.learner import Context, Learner, Taken
 from shift_learner.learners import learner_named
 from shift_learner.learners.planning import engine
-from shift_schemas.randomness import pick
+from shift_model.random_numbers import pick
 
-from shift_simulator.draws import Bools, Floats, Ints
+from shift_simulator.random_streams import Bools, Floats, Ints
 
 
 class BatchLearner(Protocol):
@@ -42,7 +42,7 @@ def batch_learner(context: Context, runs: int) -> BatchLearner:
 
 
 def pick_each(probabilities: Floats, u: Floats) -> Ints:
-    """:func:`shift_schemas.randomness.pick` for each row of ``probabilities`` [runs, actions]."""
+    """:func:`shift_model.random_numbers.pick` for each row of ``probabilities`` [runs, actions]."""
     reached: Bools = np.cumsum(probabilities, axis=1) > u[:, None]
     last = probabilities.shape[1] - 1 - (probabilities[:, ::-1] > 0).argmax(axis=1)
     found: Ints = np.where(reached[:, -1], reached.argmax(axis=1), last)

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from math import exp
 
 import numpy as np
+from shift_model.vocabulary import AWARENESSES, GAZES
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.study import CapacitySettings, RewardSettings, Study
-from shift_schemas.words import AWARENESSES, GAZES
+from shift_study.study import CapacitySettings, RewardSettings, Study
 
-from shift_simulator.batch import BatchLearner
-from shift_simulator.draws import Bools, Draws, Floats, Ints, drawn, index
+from shift_simulator.batched_learners import BatchLearner
+from shift_simulator.random_streams import Bools, Draws, Floats, Ints, drawn, index
 from shift_simulator.users import ACTIONS, DEVIATION, DURATIONS, User, true_capacity
 
 MARGIN = 1e-9

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 from shift_learner.learner import Context
-from shift_schemas.study import Study
+from shift_study.study import Study
 
-from shift_simulator.batch import batch_learner
-from shift_simulator.draws import Floats, session_seeds
-from shift_simulator.dynamics import simulate
+from shift_simulator.batched_learners import batch_learner
+from shift_simulator.batched_sessions import simulate
 from shift_simulator.optimum import optimum
+from shift_simulator.random_streams import Floats, session_seeds
 from shift_simulator.table2 import EPISODES
 from shift_simulator.user_study import crossing
 from shift_simulator.users import User

@@ -13,13 +13,13 @@ from typing import Any, Literal
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from shift_schemas.scoring import suggestions
-from shift_schemas.study import Study
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
+from shift_study.scoring import suggestions
+from shift_study.study import Study
 
 from shift_simulator import ENV_ID
-from shift_simulator.draws import drawn
-from shift_simulator.dynamics import Partners
+from shift_simulator.batched_sessions import Partners
+from shift_simulator.random_streams import drawn
 from shift_simulator.users import ACTIONS, PAPER_USERS, User, paper_user, parse_user
 
 

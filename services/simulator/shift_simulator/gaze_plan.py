@@ -18,13 +18,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from shift_model.vocabulary import GazeClass
 from shift_monitor.areas import NOWHERE
 from shift_monitor.attention import Attention, Dwell, dwelt, gaze_class
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.messages import GazeChunk, GazeView
-from shift_schemas.stamps import NS
-from shift_schemas.study import Study
-from shift_schemas.words import GazeClass
+from shift_schemas.timestamps import NS
+from shift_study.study import Study
 
 LEAD_NS = 1_000_000
 """From the end of one chunk to the start of the next, ns; chosen: far below the shortest fixation."""

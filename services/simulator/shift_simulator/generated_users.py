@@ -10,11 +10,11 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from shift_schemas.scoring import suggestions
-from shift_schemas.study import ScoringSettings
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
+from shift_study.scoring import suggestions
+from shift_study.study import ScoringSettings
 
-from shift_simulator.draws import Bools, Floats, Ints
+from shift_simulator.random_streams import Bools, Floats, Ints
 from shift_simulator.users import ACTIONS, User
 
 SHAPE = (2, 3, 5)

@@ -1,7 +1,7 @@
 """A simulated person at the live mesh, through the gateway, as the paper did on its real system.
 
 The gaze class of each interaction is brought about with chunks of gaze on a clock of their own, faster
-than real time. With the same session seed the decisions are those of :mod:`shift_simulator.events`.
+than real time. With the same session seed the decisions are those of :mod:`shift_simulator.session`.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import secrets
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from shift_model.vocabulary import Triple
 from shift_runtime.rest_client import RestClient
 from shift_schemas.messages import GazeView
-from shift_schemas.study import Study
-from shift_schemas.study_text import as_recorded, study_of
-from shift_schemas.words import Triple
+from shift_study.loading import as_recorded, study_of
+from shift_study.study import Study
 
 from shift_simulator.gaze_plan import chunk_of, plan_gaze
-from shift_simulator.people import SimulatedPerson, person, task_names
+from shift_simulator.simulated_person import SimulatedPerson, person, task_names
 from shift_simulator.users import User
 
 

@@ -14,12 +14,12 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from shift_model.vocabulary import AWARENESSES, GAZES
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.study import CapacitySettings, Study
-from shift_schemas.words import AWARENESSES, GAZES
+from shift_study.study import CapacitySettings, Study
 
-from shift_simulator.draws import Floats, Ints
-from shift_simulator.dynamics import FAILURE, FOCUSED, MARGIN, SUCCESS, check_simulable, costs, rewards
+from shift_simulator.batched_sessions import FAILURE, FOCUSED, MARGIN, SUCCESS, check_simulable, costs, rewards
+from shift_simulator.random_streams import Floats, Ints
 from shift_simulator.users import ACTIONS, DEVIATION, User, true_capacity
 
 UNKNOWN = AWARENESSES.index("unknown")

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any, get_args
 
 import typer
+from shift_model.vocabulary import LearnerName
 from shift_schemas.errors import shorten
-from shift_schemas.hints import did_you_mean
-from shift_schemas.words import LearnerName
+from shift_schemas.suggestions import did_you_mean
 
 LEARNER_NAMES: tuple[str, ...] = get_args(LearnerName)
 LEARNER_HELP = f"Name of a learner: {', '.join(LEARNER_NAMES)}."

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from shift_schemas.randomness import DECISION, uniform
+from shift_model.random_numbers import DECISION, uniform
 
 TASK, GAZE_KEPT, GAZE_CLASS, DEVIATES, COIN, SUCCESS, T_COMPREHENSION, T_ENABLEDNESS, SESSION = range(1, 10)
 """Streams of the person; the last makes the session seeds of an experiment."""

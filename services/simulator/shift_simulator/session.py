@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from shift_decider import core as decider
 from shift_learner import core as learner
+from shift_model.vocabulary import Triple
 from shift_monitor import core as monitor
 from shift_schemas.messages import (
     FORMAT,
@@ -26,13 +27,12 @@ from shift_schemas.messages import (
     Result,
     Session,
 )
-from shift_schemas.stamps import Stamp
-from shift_schemas.study import Study
-from shift_schemas.study_text import study_json
-from shift_schemas.words import Triple
+from shift_schemas.timestamps import Stamp
+from shift_study.loading import study_json
+from shift_study.study import Study
 
 from shift_simulator.gaze_plan import chunk_of, plan_gaze
-from shift_simulator.people import SimulatedPerson, person, task_names
+from shift_simulator.simulated_person import SimulatedPerson, person, task_names
 from shift_simulator.users import User
 
 SESSION = "simulated"

@@ -12,13 +12,22 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
+from shift_model.random_numbers import uniform
+from shift_model.vocabulary import GAZES, GazeClass, Triple
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.randomness import uniform
-from shift_schemas.study import CapacitySettings, Study
-from shift_schemas.words import GAZES, GazeClass, Triple
+from shift_study.study import CapacitySettings, Study
 
-from shift_simulator.draws import COIN, DEVIATES, GAZE_CLASS, GAZE_KEPT, SUCCESS, T_COMPREHENSION, T_ENABLEDNESS, TASK
-from shift_simulator.dynamics import MARGIN, costs
+from shift_simulator.batched_sessions import MARGIN, costs
+from shift_simulator.random_streams import (
+    COIN,
+    DEVIATES,
+    GAZE_CLASS,
+    GAZE_KEPT,
+    SUCCESS,
+    T_COMPREHENSION,
+    T_ENABLEDNESS,
+    TASK,
+)
 from shift_simulator.users import DEVIATION, DURATIONS, User, true_capacity
 
 

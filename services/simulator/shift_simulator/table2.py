@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from shift_learner.learner import Context
-from shift_schemas.study import Study
+from shift_study.study import Study
 
-from shift_simulator.batch import BatchQLearning
+from shift_simulator.batched_learners import BatchQLearning
+from shift_simulator.batched_sessions import simulate
 from shift_simulator.criterion import table2_criterion
-from shift_simulator.draws import Floats, session_seeds
-from shift_simulator.dynamics import simulate
+from shift_simulator.random_streams import Floats, session_seeds
 from shift_simulator.users import paper_user
 
 EPISODES = 100

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from shift_schemas.errors import InvalidSettings, shorten
-from shift_schemas.hints import did_you_mean
+from shift_schemas.suggestions import did_you_mean
 
 from shift_simulator.users import PAPER_USERS, User, paper_user, parse_user
 

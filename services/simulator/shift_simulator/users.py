@@ -13,11 +13,11 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from shift_model.vocabulary import TRIPLES, Triple
 from shift_schemas.errors import InvalidSettings, field_errors, shorten
 from shift_schemas.ids import Id
-from shift_schemas.scoring import suggestions
-from shift_schemas.study import CapacitySettings, Level, NonNegative, Probability, ScoringSettings, Study
-from shift_schemas.words import TRIPLES, Triple
+from shift_study.scoring import suggestions
+from shift_study.study import CapacitySettings, Level, NonNegative, Probability, ScoringSettings, Study
 
 ACTIONS = 6
 DEVIATION = 0.05

@@ -12,7 +12,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from shift_schemas.errors import FieldError
-from shift_schemas.study import Aoi, FixationSettings
+
+from shift_study.study import Aoi, FixationSettings
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

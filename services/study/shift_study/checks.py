@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from shift_schemas.area_checks import area_mistakes, area_warnings
+from shift_model.vocabulary import TRIPLES
 from shift_schemas.errors import FieldError
-from shift_schemas.scoring import MARGIN, scores
-from shift_schemas.study import LearnerSettings, ScoringTable, Study
-from shift_schemas.study_text import study_in_force
-from shift_schemas.words import TRIPLES
+
+from shift_study.area_checks import area_mistakes, area_warnings
+from shift_study.loading import study_in_force
+from shift_study.scoring import MARGIN, scores
+from shift_study.study import LearnerSettings, ScoringTable, Study
 
 PRIOR = frozenset({"scoring_prior", "prior_value"})
 LEARNER_PARAMETERS: dict[str, frozenset[str]] = {

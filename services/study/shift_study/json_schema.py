@@ -1,6 +1,6 @@
 """The study file's JSON Schema, for editors that complete and check while one writes. Pure.
 
-``docs/study.schema.json`` is made from it: ``python -m shift_schemas.study_schema > docs/study.schema.json``.
+``docs/study.schema.json`` is made from it: ``python -m shift_study.json_schema > docs/study.schema.json``.
 It says of a single value what the parser says; what must fit together only the parser knows.
 """
 
@@ -10,7 +10,7 @@ import json
 import sys
 from typing import Any
 
-from shift_schemas.study import CONDITIONAL, DEFAULT_STRATEGIES, Study
+from shift_study.study import CONDITIONAL, DEFAULT_STRATEGIES, Study
 
 Schema = dict[str, Any]
 TITLE = "A study of the SHIFT mesh"

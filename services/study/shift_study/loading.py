@@ -10,14 +10,14 @@ from functools import lru_cache
 from typing import Any
 
 from pydantic import ValidationError
-
-from shift_schemas.area_checks import area_mistakes
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.hints import did_you_mean
-from shift_schemas.study import DEFAULT_STRATEGIES, DEFAULT_TABLE, Study, merge_patch
-from shift_schemas.study_sentences import MISTAKES, Lines, Mistake, mistakes_of, refusal
-from shift_schemas.study_shape import Path
-from shift_schemas.study_yaml import read_yaml
+from shift_schemas.suggestions import did_you_mean
+
+from shift_study.area_checks import area_mistakes
+from shift_study.mistakes import MISTAKES, Lines, Mistake, mistakes_of, refusal
+from shift_study.shape import Path
+from shift_study.study import DEFAULT_STRATEGIES, DEFAULT_TABLE, Study, merge_patch
+from shift_study.yaml_reader import read_yaml
 
 
 def parse_study(text: str, name: str = "study") -> Study:

@@ -8,11 +8,12 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple, get_args
 
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.hints import did_you_mean, level_like, nearest
 from shift_schemas.ids import ID_PATTERN, ID_RULE, propose_id
-from shift_schemas.study_shape import CONDITIONS, Path, annotation_at, default_at, dotted, keys_at, kind_at
-from shift_schemas.study_units import converted, unit_of
-from shift_schemas.yaml_core import core_number
+from shift_schemas.suggestions import did_you_mean, level_like, nearest
+
+from shift_study.shape import CONDITIONS, Path, annotation_at, default_at, dotted, keys_at, kind_at
+from shift_study.units import converted, unit_of
+from shift_study.yaml_numbers import core_number
 
 Lines = dict[Path, int]
 RULE_LENGTH = 400

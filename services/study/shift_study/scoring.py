@@ -9,10 +9,11 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
+from shift_model.vocabulary import TRIPLES, Triple
 from shift_schemas.messages import TripleView
-from shift_schemas.study import ScoringSettings
-from shift_schemas.study_text import study_from_json
-from shift_schemas.words import TRIPLES, Triple
+
+from shift_study.loading import study_from_json
+from shift_study.study import ScoringSettings
 
 MARGIN = 1e-9
 """Scores are sums of thirds: a score that equals a threshold must not fall below it by rounding."""

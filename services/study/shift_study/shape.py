@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
-from shift_schemas.study import Study
+from shift_study.study import Study
 
 Path = tuple[str | int, ...]
 Kind = Literal["text", "number", "boolean", "mapping", "list", "any"]

@@ -12,14 +12,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
-
-from shift_schemas.hints import did_you_mean
-from shift_schemas.ids import Id
-from shift_schemas.words import (
+from shift_model.vocabulary import (
     LearnerName,
     Triple,
     cognitive_state_name,
 )
+from shift_schemas.ids import Id
+from shift_schemas.suggestions import did_you_mean
 
 NonNegative = Annotated[float, Field(ge=0, le=1e6)]
 Positive = Annotated[float, Field(gt=0, le=1e6)]

@@ -17,11 +17,11 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 from ruamel.yaml.representer import SafeRepresenter
-
 from shift_schemas.errors import shorten
-from shift_schemas.study_sentences import Lines, Mistake, mistake_at, refusal
-from shift_schemas.study_shape import CONDITIONS, Path, dotted, kind_at
-from shift_schemas.yaml_core import core_value
+
+from shift_study.mistakes import Lines, Mistake, mistake_at, refusal
+from shift_study.shape import CONDITIONS, Path, dotted, kind_at
+from shift_study.yaml_numbers import core_value
 
 LARGEST = 50_000
 """Entries of a study file, aliases counted each time: a few lines of YAML can spell billions of them."""

@@ -28,8 +28,8 @@ from shift_schemas.messages import (
     SetOverride,
 )
 
-from shift_recorder.differences import Differs, Placed, compare, differ, is_missing, name_of
-from shift_recorder.refolding import Inputs
+from shift_verify.difference import Differs, Placed, compare, differ, is_missing, name_of
+from shift_verify.monitor_learner import Inputs
 
 Way = tuple[DeciderState, Observation | Config]
 """A state, and the input that leads on from it."""

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, NoReturn
 from shift_schemas.errors import shorten
 from shift_schemas.keys import OWNER_OF
 from shift_schemas.messages import Config, Fact
-from shift_schemas.study_text import study_data, study_from_json
+from shift_study.loading import study_data, study_from_json
 
 PRECISION = 1e-12
 """Relative; chosen: ``exp`` and ``atan`` of two machines may differ in a number's last digit, a result may not."""

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 from shift_learner import core as learner
 from shift_monitor import core as monitor
 from shift_monitor.gaze_input import Earlier, GazeInput
+from shift_schemas.core_protocol import Step
 from shift_schemas.errors import ShiftError
 from shift_schemas.messages import (
     Fact,
@@ -28,10 +29,9 @@ from shift_schemas.messages import (
     Session,
     Transition,
 )
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import Step
+from shift_schemas.timestamps import Stamp
 
-from shift_recorder.differences import NotRecorded, Placed, compare, differ, is_missing
+from shift_verify.difference import NotRecorded, Placed, compare, differ, is_missing
 
 
 @dataclass

@@ -11,6 +11,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from shift_recorder.core import RecorderState, ended, step
+from shift_recording.mcap.records import Attachment
+from shift_recording.provenance import STUDY, attachments_of, metadata_of
 from shift_schemas.errors import ShiftError
 from shift_schemas.messages import (
     END_ID,
@@ -24,12 +27,9 @@ from shift_schemas.messages import (
     Session,
     StartSession,
 )
-from shift_schemas.study_text import as_recorded
+from shift_study.loading import as_recorded
 
-from shift_recorder.core import RecorderState, ended, step
-from shift_recorder.differences import Difference, Differs, Placed, compare, differ, is_missing
-from shift_recorder.front import STUDY, attachments_of, metadata_of
-from shift_recorder.parsing import Attachment
+from shift_verify.difference import Difference, Differs, Placed, compare, differ, is_missing
 
 LAST = 2**61
 """The front only repeats: where a message differs as well, that is the first difference."""
@@ -162,12 +162,12 @@ def check_front(
     policies: tuple[bytes, bytes] | None,
 ) -> None:
     """Compare metadata and attachments with the messages that they repeat. Raises :class:`Differs`."""
-    for name, wanted in metadata_of(state).items():
+    for name, wanted in metadata_of(state.fact, state.config).items():
         found = metadata.get(name, {})
         for key, value in wanted.items():
             if found.get(key) != value:
                 _front("metadata", f"{name}.{key}", found.get(key), value)
-    for name, data in attachments_of(state, policies).items():
+    for name, data in attachments_of(state.config, state.original, policies).items():
         if name == STUDY:
             continue  # an input: the session's start is derived from it
         there = attachments.get(name)

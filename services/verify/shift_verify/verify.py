@@ -16,18 +16,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
+from shift_recording.checksum import check
+from shift_recording.mcap.reader import RecordedMessage, Recording, fact_of
+from shift_recording.mcap.writer import CONFIG_METADATA
+from shift_recording.provenance import STUDY
 from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, shorten
 from shift_schemas.keys import OWNER_OF, OWNERS, SUBJECTS
 from shift_schemas.messages import Config, Fact, Observation, Session
 
-from shift_recorder.checksum import check
-from shift_recorder.differences import Difference, Differs, NotRecorded, Placed, differ, name_of
-from shift_recorder.front import STUDY
-from shift_recorder.reading import RecordedMessage, Recording, fact_of
-from shift_recorder.redeciding import Redecide
-from shift_recorder.refolding import Inputs, LearnerRefold, MonitorRefold
-from shift_recorder.rerecording import LAST, Rerecord, check_front
-from shift_recorder.writing import CONFIG_METADATA
+from shift_verify.decider import Redecide
+from shift_verify.difference import Difference, Differs, NotRecorded, Placed, differ, name_of
+from shift_verify.monitor_learner import Inputs, LearnerRefold, MonitorRefold
+from shift_verify.recorder import LAST, Rerecord, check_front
 
 Progress = Callable[[int, int], None]
 """Told now and then how many messages of how many are derived."""

@@ -11,9 +11,9 @@ import pytest
 from shift_learner.learner import Context, Learner, Row, Taken, state_names
 from shift_learner.learners import LEARNERS, learner_named, linear_thompson, thompson
 from shift_learner.learners.tabular import Memory, Tabular, greedy
+from shift_model.vocabulary import LearnerName
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.study import Study
-from shift_schemas.words import LearnerName
+from shift_study.study import Study
 
 NAMES = list(LEARNERS)
 
@@ -191,8 +191,8 @@ class WinStay(Tabular):
 
 def test_a_learner_of_twenty_lines_runs_in_the_cores_and_in_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     from shift_simulator.compare import rewards_of
-    from shift_simulator.draws import session_seed
-    from shift_simulator.events import play
+    from shift_simulator.random_streams import session_seed
+    from shift_simulator.session import play
     from shift_simulator.users import paper_user
 
     monkeypatch.setitem(LEARNERS, "ucb1", WinStay())

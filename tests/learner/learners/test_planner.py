@@ -12,8 +12,8 @@ from shift_learner.learners.planner import Memory, Planner
 from shift_learner.learners.planning import beliefs as b
 from shift_learner.learners.planning.lookahead import SAME_TASK, ahead, battery_of
 from shift_learner.learners.planning.plausible import plausible_people
-from shift_schemas.study import Study
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
+from shift_study.study import Study
 
 CONTEXT = Context(Study.model_validate({"study": "s", "learner": {"name": "planner"}}))
 PLANNER = Planner()

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_learner.learner import Context, Taken
 from shift_learner.learners.q_learning import Memory, QLearning
-from shift_schemas.study_text import study_of
+from shift_study.loading import study_of
 
 LEARNER = QLearning()
 cells = st.tuples(st.integers(0, 5), st.integers(0, 5))

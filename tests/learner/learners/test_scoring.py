@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_learner.learner import Context, Taken
 from shift_learner.learners.scoring import Scoring
-from shift_schemas.study import Study
+from shift_study.study import Study
 
 LEARNER, KNOWN = Scoring(), Context(Study(study="x"))
 

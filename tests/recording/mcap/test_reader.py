@@ -12,7 +12,11 @@ from pathlib import Path
 import lz4.frame  # type: ignore[import-untyped]
 import pytest
 import zstandard
-from recorder_fixtures import (
+from shift_recording.checksum import check
+from shift_recording.mcap.reader import RecordedMessage, Recording, fact_of, facts
+from shift_recording.mcap.records import CHUNK
+from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing
+from support.recordings import (
     HEADER,
     MAGIC,
     chunk,
@@ -24,10 +28,6 @@ from recorder_fixtures import (
     record,
     write_segment,
 )
-from shift_recorder.checksum import check
-from shift_recorder.parsing import CHUNK
-from shift_recorder.reading import RecordedMessage, Recording, fact_of, facts
-from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing
 
 
 def read(path: Path) -> tuple[list[RecordedMessage], Recording, DamagedRecording | None]:
@@ -215,9 +215,9 @@ def test_chunks_of_each_compression_are_read(compression: str, tmp_path: Path) -
 BOMB = """
 import sys, zlib
 from pathlib import Path
-from recorder_fixtures import HEADER, MAGIC, chunk
+from support.recordings import HEADER, MAGIC, chunk
 from shift_schemas.errors import DamagedRecording
-from shift_recorder.reading import facts
+from shift_recording.mcap.reader import facts
 path = Path(sys.argv[1])
 try:
     list(facts(path))
@@ -276,7 +276,7 @@ _ASCII = bytes(i % 128 for i in range(256))
 
 
 def test_bombs_are_refused_below_256_mb_of_memory(tmp_path: Path) -> None:
-    here = str(Path(__file__).parent)
+    here = str(Path(__file__).parents[2])
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([here, *sys.path])}
     for name, body in bombs().items():
         path = tmp_path / "bomb.mcap"

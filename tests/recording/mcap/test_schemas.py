@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 from pydantic import BaseModel
-from recorder_fixtures import decision_fact, gaze_fact, marker_fact
-from shift_recorder.mcap_schemas import known_names, recorded_json, schema_of, subject_schemas
+from shift_recording.mcap.schemas import known_names, recorded_json, schema_of, subject_schemas
 from shift_schemas.keys import SUBJECTS
 from shift_schemas.messages import FACTS, Fact, Seen
-from shift_schemas.study import Study
+from shift_study.study import Study
+from support.recordings import decision_fact, gaze_fact, marker_fact
 
 STUDY = Study(study="coffee", tasks=["grasp", "turn"])
 STATES = ("engaged_observer", "high/focused/unknown")

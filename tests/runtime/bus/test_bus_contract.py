@@ -8,11 +8,11 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 import zenoh
-from runtime_fixtures import SOON_S, linked, until, until_asked
-from shift_runtime.bus import Bus, Incoming, Reply, Request, first_answer
-from shift_runtime.zenoh_bus import ZenohBus
-from shift_runtime.zenoh_config import zenoh_config
+from shift_runtime.bus.protocol import Bus, Incoming, Reply, Request, first_answer
+from shift_runtime.bus.zenoh import ZenohBus
+from shift_runtime.bus.zenoh_config import zenoh_config
 from shift_schemas.errors import InvalidSettings
+from support.runtime_fixtures import SOON_S, linked, until, until_asked
 
 pytestmark = pytest.mark.anyio
 OpenBus = Callable[[], Awaitable[Bus]]

@@ -10,19 +10,19 @@ from typing import Any
 
 import pytest
 import zenoh
-from runtime_fixtures import until_asked
+from shift_runtime.bus.zenoh import ZenohBus
+from shift_runtime.bus.zenoh_config import zenoh_config
 from shift_runtime.clock import SystemClock
 from shift_runtime.journal import Journal
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
-from shift_runtime.worker import Worker
-from shift_runtime.zenoh_bus import ZenohBus
-from shift_runtime.zenoh_config import zenoh_config
+from shift_runtime.service.loop import Worker
+from shift_schemas.core_protocol import Step
 from shift_schemas.errors import Unavailable
 from shift_schemas.messages import Decide
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import Step
-from worker_rig import CORE, Notes
+from shift_schemas.timestamps import Stamp
+from support.runtime_fixtures import until_asked
+from support.worker_rig import CORE, Notes
 
 
 class Hanging(threading.Thread):

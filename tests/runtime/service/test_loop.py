@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from runtime_fixtures import SOON_S, until, until_asked
 from shift_runtime import reader as reader_module
-from shift_runtime import worker as worker_module
+from shift_runtime.service import loop as worker_module
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import Conflict, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import Decide, Decision, Gaze, Marker, OutboxPage, OutboxQuery, Seen
-from shift_schemas.stamps import Stamp
-from worker_rig import CORE, Notes, Rig, config, dump, fixation, load, session
+from shift_schemas.timestamps import Stamp
+from support.runtime_fixtures import SOON_S, until, until_asked
+from support.worker_rig import CORE, Notes, Rig, config, dump, fixation, load, session
 
 RUNNING = pytest.mark.anyio
 

@@ -4,7 +4,7 @@ import sys
 import time
 
 import zenoh
-from shift_runtime.zenoh_config import zenoh_config
+from shift_runtime.bus.zenoh_config import zenoh_config
 from zenoh.handlers import Callback
 
 

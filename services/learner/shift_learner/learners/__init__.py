@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shift_schemas.errors import InvalidStudy
-from shift_schemas.hints import did_you_mean
+from shift_schemas.suggestions import did_you_mean
 
 from shift_learner.learner import Learner
 from shift_learner.learners.epsilon_greedy import EpsilonGreedy

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
 
 from shift_learner.learner import Context, Row, Taken
 from shift_learner.learners.largest import chances_of_largest

@@ -16,8 +16,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from shift_schemas.study_text import study_json, study_of
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
+from shift_study.loading import study_json, study_of
 
 from shift_learner.learner import Context, Row, Taken
 from shift_learner.learners.planning.engine import Model, State, decided, model_of, rewarded, start, values_everywhere

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
 
 from shift_learner.learner import Context, Row, Taken
 

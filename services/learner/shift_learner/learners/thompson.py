@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from shift_schemas.words import TRIPLES
+from shift_model.vocabulary import TRIPLES
 
 from shift_learner.learner import Context, Row, Taken
 from shift_learner.learners.largest import chances_of_largest

@@ -20,8 +20,8 @@ from shift_schemas.codec import decode
 from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing, shorten
 from shift_schemas.messages import FACTS, Fact
 
-from shift_recorder import parsing as p
-from shift_recorder.scanning import CutOff, Scan
+from shift_recording.mcap import records as p
+from shift_recording.mcap.scanner import CutOff, Scan
 
 MAXIMUM_HELD = 4 * 2**20
 """Bytes of schemas, channels and metadata of one file that a reader keeps."""

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 from shift_schemas.errors import DamagedRecording
 
-from shift_recorder import parsing as p
+from shift_recording.mcap import records as p
 
 
 class CutOff(Exception):

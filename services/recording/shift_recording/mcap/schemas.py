@@ -16,7 +16,7 @@ from typing import Any
 from shift_schemas.codec import VERSION
 from shift_schemas.keys import SUBJECTS
 from shift_schemas.messages import FACTS, Fact
-from shift_schemas.study import Study
+from shift_study.study import Study
 
 Schema = dict[str, Any]
 Names = Mapping[str, Sequence[str]]

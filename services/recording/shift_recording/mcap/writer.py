@@ -14,9 +14,9 @@ from mcap.writer import CompressionType, Writer
 from shift_schemas.errors import MalformedMessage, TooLarge, shorten
 from shift_schemas.keys import SUBJECTS
 
-from shift_recorder.mcap_schemas import schema_name
-from shift_recorder.parsing import MAXIMUM_BYTES, MAXIMUM_SMALL_BYTES, Attachment
-from shift_recorder.storage import DurableFile
+from shift_recording.durable_file import DurableFile
+from shift_recording.mcap.records import MAXIMUM_BYTES, MAXIMUM_SMALL_BYTES, Attachment
+from shift_recording.mcap.schemas import schema_name
 
 MAXIMUM_PAYLOAD = 8 * 2**20
 """Bytes of one message; a door's limit is 256 KB, and a chunk must stay below what a reader takes."""

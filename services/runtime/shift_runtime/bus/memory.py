@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from shift_runtime.bus import Handle, Incoming, Reply, Request
+from shift_runtime.bus.protocol import Handle, Incoming, Reply, Request
 
 T = TypeVar("T")
 
@@ -64,7 +64,7 @@ class MemoryBus:
         self._dropped = 0
 
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         for expression, handler in list(self._hub.subscribers):
             if matches(expression, key):
                 handler(Incoming(key, payload, attachment))
@@ -72,7 +72,7 @@ class MemoryBus:
     async def get(
         self, key: str, payload: bytes = b"", *, timeout_s: float, enough: Callable[[Reply], bool] | None = None
     ) -> list[Reply]:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         waiting = []
         for expression, handler in list(self._hub.servers):
             if matches(expression, key):
@@ -88,41 +88,41 @@ class MemoryBus:
         return replies
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         entry = (key, self._later(handler, limit))
         self._hub.subscribers.append(entry)
         return self._held(lambda: self._hub.subscribers.remove(entry))
 
     def serve(self, key: str, handler: Callable[[Request], None], *, limit: int = 10_000) -> Handle:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         entry = (key, self._later(handler, limit))
         self._hub.servers.append(entry)
         return self._held(lambda: self._hub.servers.remove(entry))
 
     def token(self, key: str) -> Handle:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         self._hub.tokens.add(key)
         return self._held(lambda: self._hub.tokens.discard(key))
 
     async def reopen(self) -> None:
-        """See :class:`~shift_runtime.bus.Bus`: there are no links here that could be gone."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`: there are no links here that could be gone."""
 
     async def answers_by_router(self, key: str) -> bool:
-        """See :class:`~shift_runtime.bus.Bus`: there is no router here."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`: there is no router here."""
         return False
 
     @property
     def joined(self) -> bool:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         return True
 
     @property
     def dropped(self) -> int:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         return self._dropped
 
     async def close(self) -> None:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         while self._handles:
             self._handles[-1].close()
 

@@ -20,8 +20,8 @@ import zenoh
 from shift_schemas.errors import InvalidSettings
 from zenoh.handlers import Callback
 
-from shift_runtime.bus import Handle, Incoming, Reply, Request
-from shift_runtime.zenoh_config import zenoh_config
+from shift_runtime.bus.protocol import Handle, Incoming, Reply, Request
+from shift_runtime.bus.zenoh_config import zenoh_config
 
 T = TypeVar("T")
 CLOSE_WITHIN_S = 2.0
@@ -154,7 +154,7 @@ class ZenohBus:
         return cls(session, asyncio.get_running_loop(), connect, listen)
 
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         self.session.put(
             key,
             payload,
@@ -166,7 +166,7 @@ class ZenohBus:
     async def get(
         self, key: str, payload: bytes = b"", *, timeout_s: float, enough: Callable[[Reply], bool] | None = None
     ) -> list[Reply]:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         replies: list[Reply] = []
         done: asyncio.Future[None] = self._loop.create_future()
 
@@ -207,7 +207,7 @@ class ZenohBus:
         return replies
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         enqueue = self._gate.handler(handler, limit)
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -219,7 +219,7 @@ class ZenohBus:
         return self._held(lambda session: session.declare_subscriber(key, direct(on_sample)))
 
     def serve(self, key: str, handler: Callable[[Request], None], *, limit: int = 10_000) -> Handle:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         enqueue = self._gate.handler(handler, limit)
 
         def on_query(query: zenoh.Query) -> None:
@@ -229,11 +229,11 @@ class ZenohBus:
         return self._held(lambda session: session.declare_queryable(key, direct(on_query)))
 
     def token(self, key: str) -> Handle:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         return self._held(lambda session: session.liveliness().declare_token(key))
 
     async def reopen(self) -> None:
-        """See :class:`~shift_runtime.bus.Bus`. The new session is there before the old one goes."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. The new session is there before the old one goes."""
         async with self._moving:
             try:
                 session = await _opened(self._connect, self._listen)
@@ -245,21 +245,21 @@ class ZenohBus:
             _leave(left, lambda: None)
 
     async def answers_by_router(self, key: str) -> bool:
-        """See :class:`~shift_runtime.bus.Bus`. As a client, which has no other link."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. As a client, which has no other link."""
         return await asyncio.to_thread(_answers, self._connect, key)
 
     @property
     def joined(self) -> bool:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         return bool(self.session.info.routers_zid() or self.session.info.peers_zid())
 
     @property
     def dropped(self) -> int:
-        """See :class:`~shift_runtime.bus.Bus`."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`."""
         return self._gate.dropped
 
     async def close(self) -> None:
-        """See :class:`~shift_runtime.bus.Bus`. A session that stays open hangs the process at its exit."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. A session that stays open hangs the process at its exit."""
         for handle in self._handles:
             with contextlib.suppress(zenoh.ZError):
                 handle.close()

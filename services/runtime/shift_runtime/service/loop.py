@@ -18,6 +18,8 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import structlog
 from shift_schemas.codec import decode, encode, encode_answer, encoding_of
+from shift_schemas.conflicts import repeat_conflict
+from shift_schemas.core_protocol import NotYet, Step
 from shift_schemas.errors import MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
 from shift_schemas.keys import (
     PROCEDURES,
@@ -41,11 +43,9 @@ from shift_schemas.messages import (
     OutboxRow,
     Session,
 )
-from shift_schemas.repeats import repeat_conflict
-from shift_schemas.stamps import Stamp
-from shift_schemas.step import NotYet, Step
+from shift_schemas.timestamps import Stamp
 
-from shift_runtime.bus import Bus, Incoming, Request
+from shift_runtime.bus.protocol import Bus, Incoming, Request
 from shift_runtime.claim import Claim
 from shift_runtime.clock import Clock
 from shift_runtime.journal import AnswerKey, Batch, Journal, StoredAnswer, same_content

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from shift_schemas.words import GAZES
+from shift_model.vocabulary import GAZES
 
 from shift_learner.learner import Context
 from shift_learner.learners.planning.beliefs import Beliefs, Priors, priors, started, told

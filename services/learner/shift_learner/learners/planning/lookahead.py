@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from shift_schemas.study import Study
-from shift_schemas.words import AWARENESSES
+from shift_model.vocabulary import AWARENESSES
+from shift_study.study import Study
 
 from shift_learner.learners.planning.plausible import Floats, Ints
 

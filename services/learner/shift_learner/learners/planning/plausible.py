@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from shift_schemas.scoring import MARGIN
-from shift_schemas.study import ScoringSettings, StrategySettings
-from shift_schemas.words import AWARENESSES, CAPACITIES, GAZES, TRIPLES
+from shift_model.vocabulary import AWARENESSES, CAPACITIES, GAZES, TRIPLES
+from shift_study.scoring import MARGIN
+from shift_study.study import ScoringSettings, StrategySettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

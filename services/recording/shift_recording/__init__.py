@@ -1,0 +1,1 @@
+"""Recordings as a library: segments, merging, reading and replay."""

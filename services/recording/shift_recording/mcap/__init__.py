@@ -1,0 +1,1 @@
+"""The MCAP format: records, scanner, reader, writer and schemas."""

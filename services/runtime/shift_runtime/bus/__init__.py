@@ -1,0 +1,1 @@
+"""The bus between services: its protocol, Zenoh and one in memory."""

@@ -1,0 +1,1 @@
+"""What runs one service's core over bus and journal."""

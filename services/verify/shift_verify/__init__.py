@@ -1,0 +1,1 @@
+"""Verify a recording: derive every message again and compare."""

@@ -1,0 +1,1 @@
+"""Shared by the tests: builders of messages, meshes, peers and recordings."""
