@@ -1,0 +1,99 @@
+"""The decider's messages: estimates, decisions and overrides."""
+
+from __future__ import annotations
+
+from pydantic import Field
+from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass, PolicySource
+
+from shift_schemas.ids import Id
+from shift_schemas.messages.base import Command, Count, Fact, Message, Strategy, Text
+
+
+class TripleView(Message):
+    """One of the 30 monitoring states."""
+
+    capacity: CapacityClass
+    gaze: GazeClass
+    awareness: AwarenessClass
+
+
+class Estimate(Fact):
+    """Scores and cognitive state for one task, put out when they change."""
+
+    subject = "estimate"
+
+    task: str = Field(description="The task; '' stands for every task without results.")
+    observation: TripleView
+    scores: dict[str, float] = Field(description="Each strategy's score.")
+    cognitive_state: str = Field(description="The state that the scores reduce to.")
+    suggested: Strategy = Field(description="The scoring system's action.")
+
+
+class Versions(Message):
+    """What a decision was derived from."""
+
+    observation: Count
+    policy: Count = Field(description="0: there was none.")
+    config: Count
+
+
+class Decision(Fact):
+    """Which strategy, and why."""
+
+    subject = "decision"
+
+    decision_id: Id
+    task: Id
+    n: Count = Field(ge=1, description="Number of the decision in its session.")
+    strategy: Strategy = Field(description="The strategy to use now, one level each.")
+    observation: TripleView
+    scores: dict[str, float] = Field(description="Each strategy's score.")
+    cognitive_state: str = Field(description="The cognitive state.")
+    suggested: Strategy = Field(description="The scoring system's action.")
+    actions: list[Strategy] = Field(description="All actions, in their fixed order.")
+    probabilities: list[float] = Field(description="The policy's row, per action; sums to 1.")
+    propensity: float | None = Field(
+        default=None, description="Probability of the strategy taken; none where it was overridden."
+    )
+    explored: bool = Field(description="Not the greedy action.")
+    policy_source: PolicySource = Field(description="learner, last_policy, scoring or override.")
+    versions: Versions
+    stale: bool = Field(description="The observation had not seen all that it must have.")
+    state: str = Field(description="The row of the policy that was drawn from.")
+    seed: Count = Field(description="The session's seed; the draw's generator is seeded by (seed, n).")
+    override_id: str = Field(default="", description="The override that it follows; '' is none.")
+    reason: str = Field(default="", description="The override's reason.")
+
+
+class Override(Fact):
+    """The experimenter chose the strategy of a task's next decision."""
+
+    subject = "override"
+
+    override_id: Id
+    task: Id
+    strategy: Strategy
+    reason: Text = ""
+
+
+class Decide(Command):
+    """Which strategy now, for this task?"""
+
+    procedure = "decide"
+
+    task: Id
+
+
+class SetOverride(Command):
+    """Choose the strategy of the task's next decision."""
+
+    procedure = "override"
+
+    task: Id
+    strategy: Strategy
+    reason: Text = ""
+
+    def content(self) -> str:
+        """The same levels in another order are the same content."""
+        levels = dict(sorted(self.strategy.items()))
+        return Command.content(self.model_copy(update={"strategy": levels}))

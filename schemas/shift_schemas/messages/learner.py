@@ -1,0 +1,101 @@
+"""The learner's messages: performances, transitions and policies."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+from shift_model.vocabulary import LearnerName
+
+from shift_schemas.ids import Id
+from shift_schemas.messages.base import Command, Count, Fact, Message, Strategy, Warnings
+from shift_schemas.messages.decider import Versions
+
+
+class Result(Message):
+    """How one dimension of the task went."""
+
+    success: bool
+    duration_s: Annotated[float, Field(ge=0, le=1e6)] = Field(description="Time to solve it (T), s.")
+
+
+class ScoredResult(Result):
+    """A result with its task performance."""
+
+    value: float = Field(description="success x exp(-decay x duration_s).")
+
+
+class Performance(Fact):
+    """How the task went, and the reward of it."""
+
+    subject = "performance"
+
+    decision_id: Id
+    task: Id
+    n: Count = Field(ge=1, description="Number of the performance in its session.")
+    comprehension: ScoredResult
+    enabledness: ScoredResult
+    reward: float
+    cumulative_reward: float
+    corrects: bool = Field(default=False, description="It replaces an earlier report of the same decision.")
+    result: Count = Field(
+        default=0, description="Which of the task's results it is, from 1; a correction has that of the first report."
+    )
+    warnings: Warnings = Field(default=[], description="What was accepted and may not be meant.")
+
+
+class Transition(Fact):
+    """What was learned from: state, action, reward."""
+
+    subject = "transition"
+
+    decision_id: Id
+    task: Id
+    state: str = Field(description="The row that was updated.")
+    action: Strategy
+    reward: float
+    propensity: float | None = Field(default=None, description="None where the action was an override.")
+    versions: Versions
+    value: float = Field(description="The row's value of the action after the update.")
+
+
+class PolicyRow(Message):
+    """One state's row."""
+
+    probabilities: list[float] = Field(description="Per action; sums to 1.")
+    values: list[float] = Field(description="What they were made from, per action.")
+    visits: list[Count] = Field(description="Reported decisions per action.")
+
+
+class Policy(Fact):
+    """Action probabilities for each state, for one decision number."""
+
+    subject = "policy"
+
+    version: Count = Field(ge=1)
+    learner: LearnerName
+    for_n: Count = Field(ge=1, description="The decision number that it holds for.")
+    actions: list[Strategy]
+    states: dict[str, PolicyRow]
+    epsilon: float | None = Field(default=None, description="Probability of exploring, where the learner has one.")
+    cumulative_reward: float = 0.0
+
+
+class ReportPerformance(Command):
+    """How the task went. ``command_id`` is the decision's id; a correction has an id of its own."""
+
+    procedure = "report_performance"
+
+    comprehension: Result
+    enabledness: Result
+    corrects: Id | None = Field(default=None, description="The decision whose report this one replaces.")
+
+    def content(self) -> str:
+        """A first report's content has no ``corrects``, as before there were corrections."""
+        beside = self.beside if self.corrects is not None else {*self.beside, "corrects"}
+        return self.model_dump_json(exclude=set(beside))
+
+    @property
+    def decision_id(self) -> str:
+        """The decision that is reported."""
+        return self.corrects or self.command_id

@@ -1,0 +1,126 @@
+"""The monitor's messages: gaze, fixations and the observation of the partner."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field, model_validator
+from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass
+
+from shift_schemas.ids import Id
+from shift_schemas.messages.base import Count, Fact, GazeOutcome, Message, Seconds, Warnings
+from shift_schemas.timestamps import Stamp
+
+
+class Gaze(Fact):
+    """A chunk of gaze as it was applied. Columns of equal length; a lost sample is 0, 0, invalid."""
+
+    subject = "gaze"
+
+    source: Id = Field(description="The gaze source.")
+    seq: Count = Field(description="Number of the chunk within its source, from 0.")
+    segment: Count = Field(default=0, description="One more with each restart of the source's clock or numbering.")
+    outcome: GazeOutcome = Field(default="applied", description="late: recorded, not applied.")
+    t: list[Seconds] = Field(description="Source clock, s.")
+    x: list[float] = Field(default=[], description="0..1 from the left; empty for gaze on AOIs.")
+    y: list[float] = Field(default=[], description="0..1 from the top; empty for gaze on AOIs.")
+    valid: list[bool] = Field(default=[], description="Whether the sample is one; empty for gaze on AOIs.")
+    aoi: list[str] = Field(default=[], description="AOI names, '' is none; empty for points.")
+    warnings: Warnings = Field(default=[], description="What was accepted and may not be meant, or has no effect.")
+
+
+class Fixation(Fact):
+    """A finished fixation, on the source's clock."""
+
+    subject = "fixation"
+
+    source: Id = Field(description="The gaze source.")
+    segment: Count = Field(default=0, description="The segment of the source that it began in.")
+    start_s: Seconds = Field(description="Start, source clock, s.")
+    duration_s: Annotated[float, Field(ge=0)] = Field(description="Duration, s.")
+    x: float = Field(description="Mean position, 0..1 from the left.")
+    y: float = Field(description="Mean position, 0..1 from the top.")
+    aoi: str = Field(description="The AOI at the mean position; '' is none.")
+
+
+class CapacityView(Message):
+    """Processing capacity."""
+
+    value: float = Field(description="Its value.")
+    category: CapacityClass = Field(description="low or high.")
+
+
+class GazeView(Message):
+    """The visual distribution of attention."""
+
+    category: GazeClass = Field(description="distracted, uncertain or focused.")
+    weights: dict[Id, float] = Field(description="Attention weight per AOI; they sum to 1.")
+    focus_shift: float = Field(description="Focus shift, 0..1.")
+    aoi: str = Field(description="The held target; '' is none.")
+    fixations: Count = Field(description="Finished fixations so far.")
+    dropped: Count = Field(description="Gaze chunks that never came, by their numbers.")
+    restarts: Count | None = Field(default=None, description="How often a source began its clock or numbering anew.")
+    samples: Count | None = Field(default=None, description="Samples applied, all sources together.")
+    dwell_s: float | None = Field(default=None, description="Dwell on AOIs in this session, s.")
+    lost: float | None = Field(default=None, description="Share of the source's time without a valid sample, 0..1.")
+    unclassified: float | None = Field(default=None, description="Share of its time in no fixation, 0..1.")
+    off_aoi: float | None = Field(default=None, description="Share of its time on no AOI, 0..1.")
+    off_stimulus: float | None = Field(
+        default=None, description="Share of its time with points outside 0..1; part of unclassified or off_aoi."
+    )
+    received: Stamp | None = Field(default=None, description="When the last applied sample was received.")
+    age_s: float | None = Field(default=None, description="Time since then at the observation's stamp, s.")
+
+
+class AwarenessView(Message):
+    """What the results of one task say."""
+
+    category: AwarenessClass = Field(description="The class.")
+    comprehension: float = Field(description="Success ratio over the window.")
+    enabledness: float = Field(description="Success ratio over the window.")
+    results: Count = Field(description="Results so far.")
+
+
+class Observation(Fact):
+    """The whole partner model."""
+
+    subject = "observation"
+
+    version: Count = Field(ge=1, description="One more with each observation.")
+    capacity: CapacityView
+    gaze: GazeView
+    awareness: dict[Id, AwarenessView] = Field(description="Per task that has results.")
+    warnings: Warnings = Field(default=[], description="Those of the last gaze and of the last result.")
+
+
+class GazeChunk(Message):
+    """A chunk of gaze, points on the stimulus or AOI names, as a source sends it."""
+
+    source: Id = Field(description="The gaze source.")
+    seq: Count = Field(description="Number of the chunk within its source, from 0.")
+    t: Annotated[list[Seconds], Field(min_length=1)] = Field(description="Rising; seconds of the source's clock.")
+    x: list[float | None] | None = Field(default=None, description="0..1 from the left; null where lost.")
+    y: list[float | None] | None = Field(default=None, description="0..1 from the top; null where lost.")
+    valid: list[bool] | None = Field(default=None, description="Left out: valid wherever x and y are there.")
+    aoi: list[str | None] | None = Field(default=None, description="AOI names; null is none of them.")
+
+    @model_validator(mode="after")
+    def _columns(self) -> GazeChunk:
+        if self.aoi is not None:
+            if self.x is not None or self.y is not None or self.valid is not None:
+                raise ValueError("give either aoi, or x and y with valid")
+            columns: list[tuple[str, list[Any] | None]] = [("aoi", self.aoi)]
+        elif self.x is None or self.y is None:
+            raise ValueError("give either aoi, or x and y with valid")
+        else:
+            columns = [("x", self.x), ("y", self.y), ("valid", self.valid)]
+        for name, column in columns:
+            if column is not None and len(column) != len(self.t):
+                raise ValueError(f"{name} has {len(column)} entries and t has {len(self.t)}; they must be as many")
+        if any(b <= a for a, b in zip(self.t, self.t[1:], strict=False)):
+            raise ValueError("t must rise within a chunk")
+        if self.valid is not None and self.x is not None and self.y is not None:
+            for i, ok in enumerate(self.valid):
+                if ok and (self.x[i] is None or self.y[i] is None):
+                    raise ValueError(f"sample {i} is valid and has no x or y")
+        return self
