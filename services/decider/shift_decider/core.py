@@ -15,7 +15,8 @@ from pydantic import TypeAdapter
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import PolicySource, Triple
 from shift_schemas.core_protocol import NotYet, Step, covers_gaze
-from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.lifecycle import LIVE, check_accepts
 from shift_schemas.messages import (
     Command,
     Config,
@@ -49,7 +50,7 @@ class DeciderState:
 
     session: str
     seed: int
-    phase: SessionState = "live"
+    phase: SessionState = LIVE
     config: Config | None = None
     observation: Observation | None = None
     policy: Policy | None = None
@@ -192,7 +193,7 @@ def _decide(state: DeciderState, command: Decide, now: Stamp, late: bool) -> Ste
 
 def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: Stamp, late: bool) -> Decision:
     """The next decision for ``task``. The gateway's preview is this very function, on its replica."""
-    _check_live(state)
+    check_accepts(state.session, state.phase, Decide)
     missing = lacks(state, need)
     study = _study(state, missing, late)
     check_task(study, task)
@@ -254,7 +255,7 @@ def _choose(state: DeciderState, study: Study, task: str, triple: Triple, found:
 
 
 def _override(state: DeciderState, command: SetOverride, now: Stamp, late: bool) -> Step[DeciderState]:
-    _check_live(state)
+    check_accepts(state.session, state.phase, command)
     study = _study(state, lacks(state, command.need), late)
     check_task(study, command.task)
     check_strategy(study, command.strategy)
@@ -296,11 +297,6 @@ def check_strategy(study: Study, strategy: Strategy) -> None:
     ]
     if errors:
         raise MalformedMessage(f"{errors[0].field}: {errors[0].rule}", tuple(errors))
-
-
-def _check_live(state: DeciderState) -> None:
-    if state.phase != "live":
-        raise Conflict(f"session {state.session} has ended")
 
 
 def _study(state: DeciderState, missing: Lacks, late: bool) -> Study:

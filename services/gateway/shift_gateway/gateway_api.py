@@ -15,6 +15,7 @@ from shift_runtime.mesh_api import READ_WAIT_S, CommandDoor
 from shift_runtime.mesh_client import MeshClient
 from shift_schemas.core_protocol import NotYet, covers
 from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, shorten
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Observation, Seen, Session
 from shift_schemas.timestamps import NS
 
@@ -33,7 +34,7 @@ class Door(CommandDoor):
     async def session(self, session: str) -> dict[str, Any]:
         """The session, with counts so far."""
         view = await self.replica.view(session)
-        if view.fact.state != "ended":
+        if not has_ended(view.fact.state):
             await self._read(view, tuple(view.sequences))
         return session_body(view)
 
@@ -41,7 +42,7 @@ class Door(CommandDoor):
         """Every session."""
         if not await self.replica.reader.pull("recorder") and "recorder" in self.replica.missing:
             raise Unavailable("the recorder does not answer, so nobody knows which sessions there are")
-        live = [view for view in self.replica.views.values() if view.fact.state != "ended"]
+        live = [view for view in self.replica.views.values() if not has_ended(view.fact.state)]
         await asyncio.gather(*(self._read(view, tuple(view.sequences)) for view in live))
         return [session_body(view) for view in self.replica.views.values()]
 
@@ -113,7 +114,7 @@ class Door(CommandDoor):
     async def _current(self, session: str, owner: str) -> View:
         """The session's view; of one that ended before this gateway began, the journal is read now."""
         view = await self.replica.view(session)
-        if view.fact.state == "ended" and (session, owner) not in self.replica.reader.cursors:
+        if has_ended(view.fact.state) and (session, owner) not in self.replica.reader.cursors:
             silent = await self.replica.reader.pull_all(("monitor", "decider", "learner"), session)
             if silent:
                 raise Unavailable(f"the {silent[0]} does not answer")
@@ -134,6 +135,6 @@ def session_body(view: View) -> dict[str, Any]:
     """A session as REST shows it."""
     fact: Session = view.fact
     data: dict[str, Any] = fact.model_dump(mode="json", exclude={"stamp", "seen"})
-    if fact.state != "ended":
+    if not has_ended(fact.state):
         data["counts"] = dict(view.counts)
     return data

@@ -17,6 +17,7 @@ from shift_model.reward import reward, task_performance
 from shift_model.vocabulary import Triple
 from shift_schemas.core_protocol import NotYet, Step
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
+from shift_schemas.lifecycle import LIVE, check_accepts, is_ending
 from shift_schemas.messages import (
     Command,
     Config,
@@ -73,7 +74,7 @@ class LearnerState:
     """All that the learner knows of one session. ``memory`` is the learner's own, as plain JSON on disk."""
 
     session: str
-    phase: SessionState = "live"
+    phase: SessionState = LIVE
     config: Config | None = None
     memory: Any = None
     open: dict[str, Open] = field(default_factory=dict)
@@ -181,8 +182,7 @@ def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[Learne
 
 
 def _reported(state: LearnerState, command: ReportPerformance, now: Stamp, late: bool) -> Step[LearnerState]:
-    if state.phase != "live":
-        raise Conflict(f"session {state.session} has ended")
+    check_accepts(state.session, state.phase, command)
     if command.corrects is not None and command.corrects in state.reported:
         return _corrected(state, command, now)
     _check_known(state, command, late)
@@ -240,7 +240,7 @@ def _learned(state: LearnerState, performance: Performance, now: Stamp) -> Step[
 
 def _ended(state: LearnerState, now: Stamp) -> Step[LearnerState]:
     """What waited for a next decision that will not come is learned without one."""
-    if state.phase != "ending" or not state.rewards:
+    if not is_ending(state.phase) or not state.rewards:
         return Step(state)
     facts: list[Fact] = []
     for decision_id in list(state.rewards):

@@ -14,6 +14,7 @@ from typing import Any
 from pydantic import TypeAdapter
 from shift_schemas.core_protocol import NotYet, Step
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
+from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import (
     CapacityView,
     Config,
@@ -216,7 +217,7 @@ def _quality(state: MonitorState, now: Stamp) -> dict[str, Any]:
 def _session(state: MonitorState | None, event: Session, now: Stamp) -> Step[MonitorState]:
     if state is None:
         return Step(initial(event))
-    if event.state == "live" or state.ended:
+    if accepts_input(event.state) or state.ended:
         return Step(state)
     if not state.study:
         return Step(replace(state, ended=True))

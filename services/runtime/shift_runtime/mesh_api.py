@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from shift_schemas.errors import Unavailable, UnknownThing
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import (
     END_ID,
     START_ID,
@@ -82,7 +83,7 @@ class CommandDoor:
     async def report(self, session: str, body: PerformanceBody) -> tuple[dict[str, Any], bool]:
         """How the task went."""
         view = await self.replica.view(session)
-        if view.fact.state != "ended":
+        if not has_ended(view.fact.state):
             await self._check_decision(session, view, body.decision_id)
         command = ReportPerformance(
             command_id=new_id("c-") if body.corrects else body.decision_id, session=session, need=view.need,

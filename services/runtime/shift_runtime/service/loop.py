@@ -32,6 +32,7 @@ from shift_schemas.keys import (
     build_key,
     parse_key,
 )
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import (
     COMMANDS,
     FACTS,
@@ -390,7 +391,7 @@ class Worker(Generic[S]):
             return
         self.processed[session, read.owner] = read.seq
         turn.batch.cursors[session, read.owner] = read.seq
-        if isinstance(read.fact, Session) and read.fact.state == "ended":
+        if isinstance(read.fact, Session) and has_ended(read.fact.state):
             turn.ended.add(session)
 
     def _hold_back(self, session: str, read: ReadFact) -> None:
