@@ -13,7 +13,7 @@ from shift_decider.core import ANY_TASK, decided
 from shift_runtime.clock import Clock
 from shift_runtime.mesh_api import READ_WAIT_S, CommandDoor
 from shift_runtime.mesh_client import MeshClient
-from shift_schemas.core_protocol import NotYet, covers
+from shift_schemas.core_protocol import InputsMissing, covers
 from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, shorten
 from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Observation, Seen, Session
@@ -96,10 +96,10 @@ class Door(CommandDoor):
         wait_s = await self._wait_s(view)
         await self._read(view, ("decider",))
 
-        def attempt(late: bool) -> dict[str, Any] | None:
+        def attempt(timed_out: bool) -> dict[str, Any] | None:
             try:
-                found = decided(decider_state(view), task, PREVIEW_ID, view.need, self.clock.now(), late)
-            except NotYet:
+                found = decided(decider_state(view), task, PREVIEW_ID, view.need, self.clock.now(), timed_out)
+            except InputsMissing:
                 return None
             return found.model_dump(mode="json", exclude={"decision_id"})
 
@@ -107,7 +107,7 @@ class Door(CommandDoor):
         came = await self.replica.wait(
             session, ("recorder", "monitor", "learner"), lambda: attempt(False) is not None, wait_s
         )
-        result = attempt(late=not came)
+        result = attempt(timed_out=not came)
         assert result is not None
         return result
 

@@ -82,7 +82,9 @@ def session_answer(fact: Session) -> dict[str, Any]:
     return data
 
 
-def step(state: RecorderState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[RecorderState]:
+def step(
+    state: RecorderState | None, message: Fact | Command, now: Stamp, timed_out: bool = False
+) -> Step[RecorderState]:
     """Carry out one command.
 
     Raises

@@ -172,7 +172,7 @@ class MonitorRefold(Refold):
 
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """See :class:`Refold`."""
-        return monitor.step(state, event, now, late=True)
+        return monitor.step(state, event, now, timed_out=True)
 
     def input_of(self, group: list[Placed]) -> object | None:
         """Gaze is its own input; of the others exactly one is further than before."""
@@ -226,7 +226,7 @@ class LearnerRefold(Refold):
 
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """See :class:`Refold`."""
-        return learner.step(state, event, now, late=True)  # type: ignore[arg-type]
+        return learner.step(state, event, now, timed_out=True)  # type: ignore[arg-type]
 
     def input_of(self, group: list[Placed]) -> object | None:
         """A performance is its own input; else a configuration, a decision or the session's end."""
