@@ -17,8 +17,9 @@ from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
 from shift_schemas.codec import encode
 from shift_schemas.errors import ShiftError, UnknownThing, check_id
-from shift_schemas.keys import OWNERS, ServiceKey, build_key
+from shift_schemas.keys import ServiceKey, build_key
 from shift_schemas.messages import Fact, GazeChunk, Health
+from shift_schemas.registry import OWNERS
 
 from shift_gateway import bodies
 from shift_gateway.docs_page import add_docs

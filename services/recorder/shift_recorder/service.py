@@ -35,9 +35,10 @@ from shift_runtime.service.loop import Asked, Core, Worker, _Turn
 from shift_runtime.settings import MeshSettings
 from shift_runtime.study_files import study_to_start
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, ShiftError, Unavailable
-from shift_schemas.keys import OWNERS, READS, ROOT, FactKey, StreamKey, parse_key
+from shift_schemas.keys import ROOT, FactKey, StreamKey, parse_key
 from shift_schemas.lifecycle import has_ended, is_ending
 from shift_schemas.messages import END_ID, Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
+from shift_schemas.registry import OWNERS, READS
 from shift_study.loading import study_from_json
 
 from shift_recorder import core

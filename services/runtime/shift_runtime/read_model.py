@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from shift_schemas.errors import Unavailable, UnknownThing
-from shift_schemas.keys import OWNERS
 from shift_schemas.messages import (
     Config,
     Decision,
@@ -24,6 +23,7 @@ from shift_schemas.messages import (
     Seen,
     Session,
 )
+from shift_schemas.registry import OWNERS
 from shift_study.loading import study_from_json
 from shift_study.study import Study
 

@@ -22,9 +22,7 @@ from shift_schemas.conflicts import repeat_conflict
 from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
 from shift_schemas.keys import (
-    PROCEDURES,
     ROOT,
-    STREAMS,
     CommandKey,
     FactKey,
     ServiceKey,
@@ -34,8 +32,6 @@ from shift_schemas.keys import (
 )
 from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import (
-    COMMANDS,
-    FACTS,
     Command,
     Fact,
     GazeChunk,
@@ -44,6 +40,7 @@ from shift_schemas.messages import (
     OutboxRow,
     Session,
 )
+from shift_schemas.registry import COMMANDS, FACTS, PROCEDURES, STREAMS
 from shift_schemas.timestamps import Stamp
 
 from shift_runtime.bus.protocol import Bus, Incoming, Request
