@@ -46,9 +46,9 @@ class Convergence:
             return
         if not silent and (misfit := self._misfit(session)):
             raise Conflict(misfit)
-        late = (silent or self.behind(session))[0]
+        slow = (silent or self.behind(session))[0]
         why = "does not answer" if silent else "has not caught up"
-        raise Unavailable(f"session {session} cannot end yet: the {late} {why}; ask again")
+        raise Unavailable(f"session {session} cannot end yet: the {slow} {why}; ask again")
 
     def behind(self, session: str) -> tuple[str, ...]:
         """Return the owners whose facts the recorder has not processed, else the services that have not caught up."""

@@ -22,6 +22,7 @@ from shift_runtime.service.progress import Progress
 from shift_runtime.service.requests import PendingRequest
 from shift_runtime.service.states import SessionStates
 from shift_schemas.errors import DamagedRecording, ShiftError, Unavailable
+from shift_schemas.lifecycle import has_ended, is_ending
 from shift_schemas.messages import END_ID, EndSession
 
 from shift_recorder import core
@@ -74,7 +75,7 @@ class SessionEnds:
         if not isinstance(message, EndSession) or isinstance(message, FinishSession):
             return False
         state = self._states.get(request.session)
-        return state is not None and state.fact.state != "ended" and message.command_id == END_ID
+        return state is not None and not has_ended(state.fact.state) and message.command_id == END_ID
 
     def wait(self, request: PendingRequest) -> None:
         """Keep a request for the end until the recording is finished."""
@@ -84,17 +85,17 @@ class SessionEnds:
         """Begin the second half of ends that are committed; requests for ends that are over get their result."""
         for session in list(self._waiting):
             state = self._states.get(session)
-            if state is None or state.fact.state == "ended":
+            if state is None or has_ended(state.fact.state):
                 for request in self._waiting.pop(session):
                     self._enqueue(request)
-            elif state.fact.state == "ending" and session not in self._finishing:
+            elif is_ending(state.fact.state) and session not in self._finishing:
                 self._begin(session)
 
     def resume(self) -> None:
         """Begin the second halves that a crash interrupted."""
         for session, closed in list(self._journal.sessions()):
             state = None if closed else self._states.get(session)
-            if state is not None and state.fact.state == "ending":
+            if state is not None and is_ending(state.fact.state):
                 self._begin(session)
 
     # --- the second half ---

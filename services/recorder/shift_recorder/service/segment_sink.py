@@ -19,6 +19,7 @@ from shift_runtime.service.disk_alarm import DiskAlarm
 from shift_runtime.service.progress import Progress
 from shift_runtime.service.states import SessionStates
 from shift_schemas.errors import Unavailable
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Fact, Session
 from shift_study.loading import study_from_json
 
@@ -80,7 +81,7 @@ class SegmentSink:
             self._metrics.dropped("refused")
             self._reader.cursors.pop(key, None)
             return
-        if state.fact.state == "ended":
+        if has_ended(state.fact.state):
             self._pass_over(read)
             return
         try:

@@ -23,7 +23,7 @@ class Recall(Protocol):
 class CoreStep(Protocol[S]):
     """A core's fold."""
 
-    def __call__(self, state: S | None, message: Any, now: Stamp, /, late: bool = False) -> Step[S]:
+    def __call__(self, state: S | None, message: Any, now: Stamp, /, timed_out: bool = False) -> Step[S]:
         """Return the next state and the facts that follow from ``message``."""
 
 

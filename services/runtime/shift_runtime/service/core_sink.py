@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Generic, TypeVar
 
-from shift_schemas.core_protocol import NotYet
+from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Unavailable, UnknownThing
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Session
 
 from shift_runtime.clock import Clock
@@ -50,7 +51,7 @@ class CoreSink(Generic[S]):
         if fact.subject in self._core.reads[read.owner]:
             try:
                 step = self._core.step(state, fact, self._clock.now())
-            except (NotYet, UnknownThing, Unavailable):
+            except (InputsMissing, UnknownThing, Unavailable):
                 self._defer(read)
                 return
             self._transactions.apply_step(fact.session, step)
@@ -59,7 +60,7 @@ class CoreSink(Generic[S]):
             self._defer(read)
             return
         self._transactions.mark_read(read)
-        if isinstance(fact, Session) and fact.state == "ended":
+        if isinstance(fact, Session) and has_ended(fact.state):
             self._transactions.close_session(fact.session)
 
     def _defer(self, read: ReadFact) -> None:

@@ -23,7 +23,7 @@ from typing import Any, Generic, TypeVar
 
 import structlog
 from shift_schemas.codec import encode_answer
-from shift_schemas.core_protocol import NotYet, Step
+from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import ShiftError, Unavailable, UnknownThing
 from shift_schemas.keys import ServiceKey, build_key
 
@@ -202,7 +202,7 @@ class Worker(Generic[S]):
                 self.transactions.reply(request, earlier, repeat=True)
                 return
             step = self._step(request, self._extension.prepare(request.session, request.message))
-        except NotYet as e:
+        except InputsMissing as e:
             self.notifications.flush()  # what the request waits for may follow from them
             self.waiting.park(request, e)
         except UnknownThing as e:
@@ -218,7 +218,7 @@ class Worker(Generic[S]):
             self.transactions.store_answer(request, step)
 
     def _step(self, request: PendingRequest, message: Any) -> Step[S]:
-        return self.core.step(self.states.get(request.session), message, self.clock.now(), late=request.late)
+        return self.core.step(self.states.get(request.session), message, self.clock.now(), timed_out=request.timed_out)
 
     def _answer_unknown(self, request: PendingRequest, error: UnknownThing) -> None:
         """Refuse a request about something unknown, after the owners were asked once more.

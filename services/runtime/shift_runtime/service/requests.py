@@ -32,7 +32,7 @@ class PendingRequest:
     requests: list[Request]
     deadline: float | None = None
     """When the service gives up waiting for missing inputs, on the loop's clock."""
-    late: bool = False
+    timed_out: bool = False
     """Whether it has given up."""
     checked: bool = False
     """Whether the owners were asked again before something was called unknown."""

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Iterable
 from typing import Any, Protocol
 
-from shift_schemas.core_protocol import NotYet
+from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Unavailable
 
 from shift_runtime.reader import SESSION_OWNER
@@ -46,7 +46,7 @@ class Waiting:
         self._resume = resume
         self._parked: dict[str, list[PendingRequest]] = {}
 
-    def park(self, request: PendingRequest, missing: NotYet) -> None:
+    def park(self, request: PendingRequest, missing: InputsMissing) -> None:
         """Keep a request until its session's inputs change or its time is over; pull the owners that it waits for.
 
         The time counts from the first call: a request that is parked again keeps its deadline.
@@ -109,5 +109,5 @@ class Waiting:
         parked = self._parked.get(request.session, [])
         if request in parked:
             parked.remove(request)
-            request.late = True
+            request.timed_out = True
             self._resume(request)
