@@ -1,10 +1,10 @@
-"""The monitor's shell: what it takes in, by whom. The worker does the rest."""
+"""The monitor's shell: its core, the owners that it reads, and its gaze stream. The worker does the rest."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from shift_runtime.service.loop import Core, Recall
+from shift_runtime.service.core import Core, Recall
 from shift_schemas.messages import GazeChunk
 from shift_schemas.registry import READS
 
@@ -14,7 +14,7 @@ from shift_monitor.gaze_input import gaze_input
 
 
 def prepared(message: Any, recall: Recall) -> Any:
-    """Return a chunk of gaze with what was recorded under its number before."""
+    """Return a chunk of gaze together with the fact that was recorded under its number before."""
     return gaze_input(message, recall) if isinstance(message, GazeChunk) else message
 
 
@@ -26,4 +26,5 @@ CORE: Core[MonitorState] = Core(
     reads=READS["monitor"],
     prepare=prepared,
     lookups={"gaze": ("source", "seq")},
+    streams={"gaze": GazeChunk},
 )
