@@ -1,0 +1,58 @@
+"""The attention equations against the paper's, written out."""
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shift_model.attention import (
+    TOTAL,
+    gaze_class,
+    lowered_focus_shift,
+    next_weights,
+    raised_focus_shift,
+    uniform_weights,
+)
+
+THRESHOLDS: dict[str, Any] = {
+    "focused_dominance": 0.5, "focused_shift": 0.33, "distracted_dominance": 0.35, "distracted_shift": 0.66,
+}  # fmt: skip
+
+
+@given(st.integers(2, 8), st.data())
+def test_weights_follow_the_equation_of_the_paper_above_the_floor(targets: int, data: st.DataObject) -> None:
+    target, gain = data.draw(st.integers(0, targets - 1)), 0.1 / targets
+    after = next_weights(uniform_weights(targets), target, gain, 0.0)
+    expected = [1 / targets + gain if i == target else 1 / targets - gain / (targets - 1) for i in range(targets)]
+    assert after == pytest.approx(expected)
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.floats(0, 0.5)), max_size=20))
+def test_weights_keep_their_sum_and_their_floor(dwells: list[tuple[int, float]]) -> None:
+    weights = uniform_weights(4)
+    for target, gain in dwells:
+        weights = next_weights(weights, target, gain, 0.05)
+        assert sum(weights) == pytest.approx(TOTAL)
+        assert min(weights) >= 0.05 - 1e-12
+
+
+def test_single_target_keeps_the_whole_weight() -> None:
+    assert next_weights((1.0,), 0, 0.3, 0.0) == (1.0,)
+
+
+def test_focus_shift_stays_between_its_floor_and_its_cap() -> None:
+    assert raised_focus_shift(0.5, 0.2) == 0.7
+    assert raised_focus_shift(0.9, 0.2) == 1.0
+    assert lowered_focus_shift(0.5, 0.05) == 0.45
+    assert lowered_focus_shift(0.02, 0.05) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("dominance", "shift", "expected"),
+    [
+        (0.5, 0.33, "focused"), (0.9, 0.34, "uncertain"), (0.49, 0.0, "uncertain"), (0.35, 0.5, "uncertain"),
+        (0.34, 0.0, "distracted"), (0.9, 0.66, "distracted"), (0.1 + 0.4 - 1e-12, 0.0, "focused"),
+    ],
+)  # fmt: skip
+def test_gaze_class_by_both_thresholds(dominance: float, shift: float, expected: str) -> None:
+    assert gaze_class(dominance, shift, **THRESHOLDS) == expected
