@@ -1,5 +1,6 @@
 """The attention equations against the paper's, written out."""
 
+import random
 from typing import Any
 
 import pytest
@@ -56,3 +57,49 @@ def test_focus_shift_stays_between_its_floor_and_its_cap() -> None:
 )  # fmt: skip
 def test_gaze_class_by_both_thresholds(dominance: float, shift: float, expected: str) -> None:
     assert gaze_class(dominance, shift, **THRESHOLDS) == expected
+
+
+def by_small_parts(weights: list[float], target: int, gain: float, floor: float) -> list[float]:
+    """Return the weights after ten thousand small gains, each taken equally from those above the floor."""
+    for _ in range(10_000):
+        givers = [i for i, w in enumerate(weights) if i != target and w > floor + 1e-12]
+        for i in givers:
+            weights[i] -= gain / 10_000 / len(givers)
+        if givers:
+            weights[target] += gain / 10_000
+    return weights
+
+
+def test_weights_above_the_floor_give_what_those_at_the_floor_cannot() -> None:
+    after = next_weights((0.5, 0.02, 0.18, 0.3), 0, 0.2, 0.0)
+    assert after == pytest.approx((0.7, 0.0, 0.09, 0.21))
+
+
+@given(
+    parts=st.lists(st.floats(0.01, 1), min_size=2, max_size=6),
+    gain=st.floats(0, 1.5),
+    floor=st.sampled_from([0.0, 0.02, 0.05]),
+    data=st.data(),
+)
+def test_one_gain_equals_the_sum_of_smaller_gains(
+    parts: list[float], gain: float, floor: float, data: st.DataObject
+) -> None:
+    weights = [floor + (1 - floor * len(parts)) * p / sum(parts) for p in parts]
+    target = data.draw(st.integers(0, len(parts) - 1))
+    after = next_weights(tuple(weights), target, gain, floor)
+    cut = data.draw(st.floats(0, 1))
+    twice = next_weights(next_weights(tuple(weights), target, gain * cut, floor), target, gain * (1 - cut), floor)
+    assert twice == pytest.approx(after, abs=1e-12)
+    assert sum(after) == pytest.approx(1.0, abs=1e-12)
+    assert min(after) >= floor - 1e-12
+
+
+def test_redistribution_matches_a_loop_over_small_parts() -> None:
+    rng = random.Random(3)
+    for floor in (0.0, 0.04):
+        for _ in range(5):
+            parts = [rng.random() for _ in range(5)]
+            weights = [floor + (1 - 5 * floor) * p / sum(parts) for p in parts]
+            gain = rng.random()
+            after = next_weights(tuple(weights), 1, gain, floor)
+            assert after == pytest.approx(by_small_parts(weights, 1, gain, floor), abs=1e-3)

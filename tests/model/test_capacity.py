@@ -35,6 +35,12 @@ def test_one_demanding_level_makes_a_strategy_demanding() -> None:
     assert strategy_cost((), demanding, 0.2, 0.1) == 0.1
 
 
+def test_class_has_a_margin_at_the_threshold() -> None:
+    assert capacity_class(0.5, 0.5) == "high"
+    assert capacity_class(0.5 - 1e-10, 0.5) == "high"
+    assert capacity_class(0.5 - 1e-8, 0.5) == "low"
+
+
 @given(st.lists(numbers, min_size=1, max_size=9), numbers)
 def test_class_is_high_at_or_above_the_threshold(values: list[float], threshold: float) -> None:
     assert is_high(np.array(values), threshold).tolist() == [is_high(v, threshold) for v in values]
