@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from shift_runtime.service.loop import Core, Recall
-from shift_schemas.keys import READS
 from shift_schemas.messages import GazeChunk
+from shift_schemas.registry import READS
 
 from shift_monitor import core
 from shift_monitor.core import MonitorState

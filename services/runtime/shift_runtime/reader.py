@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import structlog
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import MalformedMessage
-from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, build_key, parse_key
-from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxRow
+from shift_schemas.keys import ROOT, FactKey, ServiceKey, build_key, parse_key
+from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, OutboxRow
+from shift_schemas.registry import FACTS, OWNER_OF, OWNERS
 
 from shift_runtime.bus.protocol import Bus, Incoming, Reply, first_answer
 from shift_runtime.links import Links
