@@ -412,7 +412,7 @@ def test_a_correction_is_learned_from_once_more(name: str) -> None:
     learner, memory = learner_named(name), state.memory
     done = core.step(state, correction(1), NOW)
     known = state.reported["d1"].open
-    naive = learner.rewarded(core.context_of(state.config.study), memory, known.taken, exp(-0.5), None)  # type: ignore[union-attr]
+    naive = learner.on_reward(core.context_of(state.config.study), memory, known.taken, exp(-0.5), None)  # type: ignore[union-attr]
     assert learner.dump(done.state.memory) == learner.dump(naive)
 
 

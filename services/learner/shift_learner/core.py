@@ -171,7 +171,7 @@ def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[Learne
         previous = None
     after = replace(
         state,
-        memory=learner.decided(context, state.memory, taken),
+        memory=learner.on_decision(context, state.memory, taken),
         open=opened,
         last=taken,
         decisions=decision.n,
@@ -311,7 +311,7 @@ def _updated(state: LearnerState, decision_id: str, now: Stamp) -> tuple[Learner
     """Learn from a reported decision, with the one that followed it where there is one."""
     context, learner = _context(state), _learner(state)
     known, gained = state.open[decision_id], state.rewards[decision_id]
-    memory = learner.rewarded(context, state.memory, known.taken, gained, known.following)
+    memory = learner.on_reward(context, state.memory, known.taken, gained, known.following)
     row = state_of(learner, known.taken)
     transition = Transition(
         session=state.session, stamp=now, seen=_seen(state), decision_id=decision_id, task=known.task,
