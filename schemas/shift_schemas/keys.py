@@ -67,7 +67,7 @@ SERVICES: tuple[str, ...] = (
     "ros2_bridge",
     "simulator",
 )
-DOORS: tuple[str, ...] = ("outbox", "health", "metrics", "alive")
+ENDPOINTS: tuple[str, ...] = ("outbox", "health", "metrics", "alive")
 KEYS = 1024
 """So many keys are remembered with their texts: each message has one, and a session has some twenty."""
 
@@ -101,7 +101,7 @@ class ServiceKey:
     """One of a service's own doors."""
 
     service: str
-    door: str
+    endpoint: str
 
 
 Key = FactKey | StreamKey | CommandKey | ServiceKey
@@ -117,8 +117,8 @@ def build_key(key: Key) -> str:
             return f"{ROOT}/{_id(session)}/in/{_word(stream, STREAMS)}"
         case CommandKey(session, procedure):
             return f"{ROOT}/{_id(session)}/rpc/{_word(procedure, PROCEDURE_OWNER)}"
-        case ServiceKey(service, door):
-            return f"{ROOT}/@service/{_word(service, SERVICES)}/{_word(door, DOORS)}"
+        case ServiceKey(service, endpoint):
+            return f"{ROOT}/@service/{_word(service, SERVICES)}/{_word(endpoint, ENDPOINTS)}"
 
 
 @lru_cache(maxsize=KEYS)
@@ -127,8 +127,8 @@ def parse_key(text: str) -> Key:
     parts = text.split("/")
     if parts[:2] == ROOT.split("/"):
         match parts[2:]:
-            case ["@service", service, door]:
-                return ServiceKey(_word(service, SERVICES), _word(door, DOORS))
+            case ["@service", service, endpoint]:
+                return ServiceKey(_word(service, SERVICES), _word(endpoint, ENDPOINTS))
             case [session, subject]:
                 return FactKey(_id(session), _word(subject, OWNER_OF))
             case [session, "in", stream]:

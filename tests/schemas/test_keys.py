@@ -5,7 +5,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import (
-    DOORS,
+    ENDPOINTS,
     OWNER_OF,
     OWNERS,
     PROCEDURE_OWNER,
@@ -28,7 +28,7 @@ keys = (
     st.builds(FactKey, ids, st.sampled_from(SUBJECTS))
     | st.builds(StreamKey, ids, st.sampled_from(sorted(STREAMS)))
     | st.builds(CommandKey, ids, st.sampled_from(sorted(PROCEDURE_OWNER)))
-    | st.builds(ServiceKey, st.sampled_from(SERVICES), st.sampled_from(DOORS))
+    | st.builds(ServiceKey, st.sampled_from(SERVICES), st.sampled_from(ENDPOINTS))
 )
 parts = ids | st.sampled_from(
     ["shift", "v1", "v2", "@service", "in", "rpc", "gaze", "decide", "decider", "outbox", "*", "**", "", "decision"]

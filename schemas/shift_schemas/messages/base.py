@@ -19,6 +19,10 @@ Count = Annotated[int, Field(ge=0, le=2**53)]
 SessionState = Literal["live", "ending", "ended"]
 
 
+SessionEvent = Literal["input", "end", "finish"]
+"""What a command means for the lifecycle of its session: see :mod:`shift_schemas.lifecycle`."""
+
+
 GazeOutcome = Literal["applied", "late"]
 
 
@@ -88,6 +92,8 @@ class Command(Message):
     """What a door asks of a fact's owner. ``command_id`` names it: a repeat gets the first result."""
 
     procedure: ClassVar[str]
+    event: ClassVar[SessionEvent] = "input"
+    """What the command means for the lifecycle of its session."""
 
     command_id: Id
     session: Id

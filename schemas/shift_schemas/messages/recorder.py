@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, JsonObject, SessionState, Text, Warnings
+from shift_schemas.messages.base import Command, Count, Fact, JsonObject, SessionEvent, SessionState, Text, Warnings
 from shift_schemas.timestamps import Stamp
 
 FORMAT = 2
@@ -79,6 +79,7 @@ class EndSession(Command):
     """End a session: nothing more is taken, the recording is finished."""
 
     procedure = "end_session"
+    event: ClassVar[SessionEvent] = "end"
 
 
 class Configure(Command):

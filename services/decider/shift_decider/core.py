@@ -14,8 +14,9 @@ from typing import NamedTuple
 from pydantic import TypeAdapter
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import PolicySource, Triple
-from shift_schemas.core_protocol import NotYet, Step, covers_gaze
-from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.core_protocol import InputsMissing, Step, covers_gaze
+from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.lifecycle import LIVE, check_accepts
 from shift_schemas.messages import (
     Command,
     Config,
@@ -49,7 +50,7 @@ class DeciderState:
 
     session: str
     seed: int
-    phase: SessionState = "live"
+    phase: SessionState = LIVE
     config: Config | None = None
     observation: Observation | None = None
     policy: Policy | None = None
@@ -71,13 +72,15 @@ def load(text: str) -> DeciderState:
     return _STATE.validate_json(text)
 
 
-def step(state: DeciderState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[DeciderState]:
+def step(
+    state: DeciderState | None, message: Fact | Command, now: Stamp, timed_out: bool = False
+) -> Step[DeciderState]:
     """Fold one message of a session.
 
     Raises
     ------
-    NotYet
-        A decision must wait for the monitor, the learner or the recorder, and ``late`` is not set.
+    InputsMissing
+        A decision must wait for the monitor, the learner or the recorder, and ``timed_out`` is not set.
     UnknownThing, Conflict, MalformedMessage, Unavailable
         The command cannot be carried out.
     """
@@ -95,9 +98,9 @@ def step(state: DeciderState | None, message: Fact | Command, now: Stamp, late: 
         case Policy():
             return Step(replace(state, policy=message))
         case Decide():
-            return _decide(state, message, now, late)
+            return _decide(state, message, now, timed_out)
         case SetOverride():
-            return _override(state, message, now, late)
+            return _override(state, message, now, timed_out)
     return Step(state)
 
 
@@ -161,43 +164,43 @@ class Lacks(NamedTuple):
         return tuple(o for o, lacking in zip(("recorder", "monitor", "learner"), self, strict=True) if lacking)
 
 
-def lacks(state: DeciderState, need: Seen) -> Lacks:
+def lacks(state: DeciderState, required: Seen) -> Lacks:
     """What is not there yet for the next decision, given what the door had answered."""
     version = state.config.version if state.config else 0
 
     def lacking(seen: Seen) -> bool:
         return (
-            seen.decision < max(need.decision, state.n)
-            or seen.config < max(need.config, version)
-            or seen.performance < need.performance
+            seen.decision < max(required.decision, state.n)
+            or seen.config < max(required.config, version)
+            or seen.performance < required.performance
         )
 
     observation, policy = state.observation, state.policy
     return Lacks(
-        config=version < max(1, need.config),
+        config=version < max(1, required.config),
         observation=observation is None
-        or observation.version < need.observation
+        or observation.version < required.observation
         or lacking(observation.seen)
-        or not covers_gaze(observation.seen, need),
+        or not covers_gaze(observation.seen, required),
         policy=policy is None or policy.for_n != state.n + 1 or lacking(policy.seen),
     )
 
 
-def _decide(state: DeciderState, command: Decide, now: Stamp, late: bool) -> Step[DeciderState]:
-    decision = decided(state, command.task, command.command_id, command.need, now, late)
+def _decide(state: DeciderState, command: Decide, now: Stamp, timed_out: bool) -> Step[DeciderState]:
+    decision = decided(state, command.task, command.command_id, command.need, now, timed_out)
     overrides = {task: o for task, o in state.overrides.items() if task != command.task}
     after = replace(state, n=decision.n, overrides=overrides)
     return Step(after, (decision,), decision)
 
 
-def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: Stamp, late: bool) -> Decision:
+def decided(state: DeciderState, task: str, decision_id: str, required: Seen, now: Stamp, timed_out: bool) -> Decision:
     """The next decision for ``task``. The gateway's preview is this very function, on its replica."""
-    _check_live(state)
-    missing = lacks(state, need)
-    study = _study(state, missing, late)
+    check_accepts(state.session, state.phase, Decide)
+    missing = lacks(state, required)
+    study = _study(state, missing, timed_out)
     check_task(study, task)
-    if missing.owners and not late:
-        raise NotYet(missing.owners, study.decider.wait_s)
+    if missing.owners and not timed_out:
+        raise InputsMissing(missing.owners, study.decider.wait_s)
     if state.observation is None or state.config is None:
         raise Unavailable("the monitor has not published an observation of this session yet; ask again")
     triple = triple_of(state.observation, task)
@@ -253,9 +256,9 @@ def _choose(state: DeciderState, study: Study, task: str, triple: Triple, found:
 # --- overrides ---
 
 
-def _override(state: DeciderState, command: SetOverride, now: Stamp, late: bool) -> Step[DeciderState]:
-    _check_live(state)
-    study = _study(state, lacks(state, command.need), late)
+def _override(state: DeciderState, command: SetOverride, now: Stamp, timed_out: bool) -> Step[DeciderState]:
+    check_accepts(state.session, state.phase, command)
+    study = _study(state, lacks(state, command.need), timed_out)
     check_task(study, command.task)
     check_strategy(study, command.strategy)
     fact = Override(
@@ -298,14 +301,9 @@ def check_strategy(study: Study, strategy: Strategy) -> None:
         raise MalformedMessage(f"{errors[0].field}: {errors[0].rule}", tuple(errors))
 
 
-def _check_live(state: DeciderState) -> None:
-    if state.phase != "live":
-        raise Conflict(f"session {state.session} has ended")
-
-
-def _study(state: DeciderState, missing: Lacks, late: bool) -> Study:
-    if missing.config and not late:
-        raise NotYet(("recorder",), study_from_json(state.config.study).decider.wait_s if state.config else 2.0)
+def _study(state: DeciderState, missing: Lacks, timed_out: bool) -> Study:
+    if missing.config and not timed_out:
+        raise InputsMissing(("recorder",), study_from_json(state.config.study).decider.wait_s if state.config else 2.0)
     if state.config is None:
         raise Unavailable("the recorder has not published a configuration of this session yet; ask again")
     return study_from_json(state.config.study)

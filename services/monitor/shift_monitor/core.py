@@ -12,8 +12,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from pydantic import TypeAdapter
-from shift_schemas.core_protocol import NotYet, Step
+from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
+from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import (
     CapacityView,
     Config,
@@ -123,7 +124,7 @@ def load(text: str) -> MonitorState:
     return _STATE.validate_json(text)
 
 
-def step(state: MonitorState | None, event: object, now: Stamp, late: bool = False) -> Step[MonitorState]:
+def step(state: MonitorState | None, event: object, now: Stamp, timed_out: bool = False) -> Step[MonitorState]:
     """Apply one message.
 
     Parameters
@@ -132,15 +133,15 @@ def step(state: MonitorState | None, event: object, now: Stamp, late: bool = Fal
         None before the session's start.
     now
         The facts' stamp.
-    late
+    timed_out
         No more waiting for what the message needs to be applied.
 
     Raises
     ------
     UnknownThing
         There is no such session.
-    NotYet
-        The session's configuration has not come yet; ``Unavailable`` instead where it is ``late``.
+    InputsMissing
+        The session's configuration has not come yet; ``Unavailable`` instead where it ``timed_out``.
     Conflict
         Gaze for an ended session or from a source that was replaced.
     MalformedMessage
@@ -154,13 +155,13 @@ def step(state: MonitorState | None, event: object, now: Stamp, late: bool = Fal
         case Config():
             return _observed(_configured(state, event), now)
         case Decision():
-            return _observed(_decided(state, event, late), now)
+            return _observed(_decided(state, event, timed_out), now)
         case Performance():
-            return _observed(_performed(state, event, late), now)
+            return _observed(_performed(state, event, timed_out), now)
         case GazeInput():
-            return _gaze(state, event, now, late)
+            return _gaze(state, event, now, timed_out)
         case GazeChunk():
-            return _gaze(state, GazeInput(event), now, late)
+            return _gaze(state, GazeInput(event), now, timed_out)
     return Step(state)
 
 
@@ -216,7 +217,7 @@ def _quality(state: MonitorState, now: Stamp) -> dict[str, Any]:
 def _session(state: MonitorState | None, event: Session, now: Stamp) -> Step[MonitorState]:
     if state is None:
         return Step(initial(event))
-    if event.state == "live" or state.ended:
+    if accepts_input(event.state) or state.ended:
         return Step(state)
     if not state.study:
         return Step(replace(state, ended=True))
@@ -232,13 +233,13 @@ def _configured(state: MonitorState, event: Config) -> MonitorState:
     return replace(state, capacity=Capacity(study.capacity.start), attention=fresh(len(study.aois)))
 
 
-def _decided(state: MonitorState, event: Decision, late: bool) -> MonitorState:
-    settings = _plan_in_force(state, late).study.capacity
+def _decided(state: MonitorState, event: Decision, timed_out: bool) -> MonitorState:
+    settings = _plan_in_force(state, timed_out).study.capacity
     return replace(state, capacity=executed(state.capacity, event.strategy, settings), decision=event.n)
 
 
-def _performed(state: MonitorState, event: Performance, late: bool) -> MonitorState:
-    _plan_in_force(state, late)
+def _performed(state: MonitorState, event: Performance, timed_out: bool) -> MonitorState:
+    _plan_in_force(state, timed_out)
     history = (corrected if event.corrects else reported)(state.awareness.get(event.task, History()), event)
     return replace(
         state,
@@ -251,11 +252,11 @@ def _performed(state: MonitorState, event: Performance, late: bool) -> MonitorSt
 # --- gaze ---
 
 
-def _gaze(state: MonitorState, given: GazeInput, now: Stamp, late: bool) -> Step[MonitorState]:
+def _gaze(state: MonitorState, given: GazeInput, now: Stamp, timed_out: bool) -> Step[MonitorState]:
     chunk = given.chunk
     if state.ended:
         raise Conflict(f"session {state.session} has ended")
-    plan = _plan_in_force(state, late)
+    plan = _plan_in_force(state, timed_out)
     if (first := is_repeat(given)) is not None:
         result = _result(state, chunk, first.accepted, first.warnings)
         return Step(state, result={**result, "observation": state.version}, repeat=True)
@@ -439,9 +440,9 @@ def _seen(state: MonitorState) -> Seen:
 # --- the study ---
 
 
-def _plan_in_force(state: MonitorState, late: bool) -> Plan:
+def _plan_in_force(state: MonitorState, timed_out: bool) -> Plan:
     if state.study:
         return plan_of(state.study)
-    if not late:
-        raise NotYet(("recorder",), CONFIG_WAIT_S)
+    if not timed_out:
+        raise InputsMissing(("recorder",), CONFIG_WAIT_S)
     raise Unavailable(f"the monitor has not read the configuration of session {state.session} yet")

@@ -36,6 +36,7 @@ from shift_runtime.settings import MeshSettings
 from shift_runtime.study_files import study_to_start
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, ShiftError, Unavailable
 from shift_schemas.keys import OWNERS, READS, ROOT, FactKey, StreamKey, parse_key
+from shift_schemas.lifecycle import has_ended, is_ending
 from shift_schemas.messages import END_ID, Command, EndSession, Fact, GazeChunk, OutboxPage, StartSession
 from shift_study.loading import study_from_json
 
@@ -92,7 +93,7 @@ class RecorderWorker(Worker[RecorderState]):
         self.bus.subscribe(f"{ROOT}/@service/**", self._stray)  # a star takes in no part that begins with @
         for session, closed in list(self.journal.sessions()):
             state = None if closed else self._state(session)
-            if state is not None and state.fact.state == "ending":
+            if state is not None and is_ending(state.fact.state):
                 self._begin_end(session)
         self._later()
 
@@ -152,7 +153,7 @@ class RecorderWorker(Worker[RecorderState]):
             super()._answer(turn, asked)
             return
         state = self._state(asked.session)
-        if state is None or state.fact.state == "ended" or asked.message.command_id != END_ID:
+        if state is None or has_ended(state.fact.state) or asked.message.command_id != END_ID:
             super()._answer(turn, asked)
             return
         self._take(turn, asked.session, self.core.step(state, asked.message, self.clock.now()))
@@ -162,10 +163,10 @@ class RecorderWorker(Worker[RecorderState]):
         """Begin the ends that are committed now; who asked for one that is over gets its result."""
         for session in list(self._ends):
             state = self._state(session)
-            if state is None or state.fact.state == "ended":
+            if state is None or has_ended(state.fact.state):
                 for asked in self._ends.pop(session):
                     self.enqueue(asked)
-            elif state.fact.state == "ending" and session not in self._ending:
+            elif is_ending(state.fact.state) and session not in self._ending:
                 self._begin_end(session)
 
     # --- recording ---
@@ -179,7 +180,7 @@ class RecorderWorker(Worker[RecorderState]):
             self.metrics.dropped("refused")
             self.reader.cursors.pop(key, None)
             return
-        if state.fact.state == "ended":
+        if has_ended(state.fact.state):
             if read.owner == "recorder" and read.fact.subject == "session" and read.seq == self.journal.heads[session]:
                 turn.ended.add(session)
                 self._tidy(session)

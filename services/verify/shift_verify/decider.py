@@ -180,7 +180,7 @@ class Redecide:
         state = self._with_policy(reached, target)
         for command in _commands(fact, state, self.inputs):
             try:
-                after = step(state, command, fact.stamp, late=True)
+                after = step(state, command, fact.stamp, timed_out=True)
                 compare(target, after.facts[0])
             except ShiftError as e:
                 differ(target, "", fact.subject, None, f"the core refuses it: {e.detail}")

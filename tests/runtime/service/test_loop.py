@@ -43,7 +43,7 @@ async def test_a_command_is_committed_published_and_answered_with_its_sequence(l
     answer = await live.decide("d1")
     assert answer.owner == "decider"
     assert answer.seq == 1
-    assert answer.result == {"n": 1, "fixations": 0, "late": False}
+    assert answer.result == {"n": 1, "fixations": 0, "timed_out": False}
     assert not answer.repeat
     assert live.outbox() == [(1, "decision d1")]
     await until(lambda: live.published)
@@ -131,21 +131,21 @@ async def test_a_command_waits_for_the_facts_that_it_needs(live: Rig) -> None:
     asked = asyncio.create_task(live.decide("d1", "after-2"))
     live.monitor.put_out(fixation(1), fixation(2))
     answer = await asked
-    assert answer.result == {"n": 3, "fixations": 2, "late": False}
+    assert answer.result == {"n": 3, "fixations": 2, "timed_out": False}
 
 
 @RUNNING
 async def test_without_a_hint_it_asks_the_owner_again_while_it_waits(live: Rig) -> None:
     asked = asyncio.create_task(live.decide("d1", "after-2"))
     live.monitor.put_out(fixation(1), fixation(2), hint=False)
-    assert (await asked).result["late"] is False
+    assert (await asked).result["timed_out"] is False
 
 
 @RUNNING
 async def test_it_gives_up_in_time_and_says_that_it_is_late(live: Rig) -> None:
     live.monitor.put_out(fixation(1))
     answer = await live.decide("d1", "after-2")
-    assert answer.result == {"n": 2, "fixations": 1, "late": True}
+    assert answer.result == {"n": 2, "fixations": 1, "timed_out": True}
     live.monitor.put_out(fixation(2))
     await until(lambda: len(live.outbox()) == 3)
     assert (await live.decide("d1", "after-2")).result == answer.result
@@ -169,7 +169,7 @@ async def test_one_session_s_waiting_holds_up_no_other(live: Rig) -> None:
     await asyncio.sleep(0)
     assert (await live.decide("d1", name="s2")).result["n"] == 1
     assert not waiting.done()
-    assert (await waiting).result["late"] is True
+    assert (await waiting).result["timed_out"] is True
 
 
 # --- unknown ---

@@ -19,7 +19,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import structlog
 from shift_schemas.codec import decode, encode, encode_answer, encoding_of
 from shift_schemas.conflicts import repeat_conflict
-from shift_schemas.core_protocol import NotYet, Step
+from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import MalformedMessage, Problem, ShiftError, Unavailable, UnknownThing
 from shift_schemas.keys import (
     PROCEDURES,
@@ -32,6 +32,7 @@ from shift_schemas.keys import (
     build_key,
     parse_key,
 )
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import (
     COMMANDS,
     FACTS,
@@ -79,7 +80,7 @@ class Recall(Protocol):
 class CoreStep(Protocol[S]):
     """A core's fold."""
 
-    def __call__(self, state: S | None, message: Any, now: Stamp, /, late: bool = False) -> Step[S]: ...
+    def __call__(self, state: S | None, message: Any, now: Stamp, /, timed_out: bool = False) -> Step[S]: ...
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ class Asked:
     message: Command | GazeChunk
     requests: list[Request]
     deadline: float | None = None
-    late: bool = False
+    timed_out: bool = False
     checked: bool = False
     """Whether the owners were asked again before something is called unknown."""
 
@@ -380,7 +381,7 @@ class Worker(Generic[S]):
         if read.fact.subject in self.core.reads[read.owner]:
             try:
                 step = self.core.step(state, read.fact, self.clock.now())
-            except (NotYet, UnknownThing, Unavailable):
+            except (InputsMissing, UnknownThing, Unavailable):
                 self._hold_back(session, read)
                 return
             self._take(turn, session, step)
@@ -390,7 +391,7 @@ class Worker(Generic[S]):
             return
         self.processed[session, read.owner] = read.seq
         turn.batch.cursors[session, read.owner] = read.seq
-        if isinstance(read.fact, Session) and read.fact.state == "ended":
+        if isinstance(read.fact, Session) and has_ended(read.fact.state):
             turn.ended.add(session)
 
     def _hold_back(self, session: str, read: ReadFact) -> None:
@@ -417,8 +418,8 @@ class Worker(Generic[S]):
                 turn.answers.append((asked, _Told(found, self._head(turn, asked.session), repeat=True)))
                 return
             message = self.prepare(asked.session, asked.message)
-            step = self.core.step(self._state(asked.session), message, self.clock.now(), late=asked.late)
-        except NotYet as e:
+            step = self.core.step(self._state(asked.session), message, self.clock.now(), timed_out=asked.timed_out)
+        except InputsMissing as e:
             self._wait(asked, e)
         except UnknownThing as e:
             self._unknown(turn, asked, e)
@@ -485,7 +486,7 @@ class Worker(Generic[S]):
 
     # --- waiting ---
 
-    def _wait(self, asked: Asked, not_yet: NotYet) -> None:
+    def _wait(self, asked: Asked, not_yet: InputsMissing) -> None:
         self._publish_hints()  # what it waits for may follow from them
         loop = asyncio.get_running_loop()
         if asked.deadline is None:
@@ -505,7 +506,7 @@ class Worker(Generic[S]):
         waiting = self._waiting.get(asked.session, [])
         if asked in waiting:
             waiting.remove(asked)
-            asked.late = True
+            asked.timed_out = True
             self.enqueue(asked)
 
     def _unknown(self, turn: _Turn, asked: Asked, error: UnknownThing) -> None:
