@@ -2,6 +2,7 @@
 
 from math import exp
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -32,3 +33,14 @@ def test_task_performance_with_the_constants_of_the_paper(success: bool, duratio
 
 def test_success_in_one_dimension_and_failure_in_the_other_cancel_at_equal_times() -> None:
     assert reward(exp(-0.5), -exp(-0.5), scale=1.0) == 0.0
+
+
+@given(st.lists(st.tuples(st.booleans(), durations), min_size=1, max_size=9), st.floats(0, 10))
+def test_arrays_give_the_bits_of_scalars(rows: list[tuple[bool, float]], decay: float) -> None:
+    success, duration_s = (np.array(column) for column in zip(*rows, strict=True))
+    values = [task_performance(*row, decay) for row in rows]
+    found = task_performance(success, duration_s, decay)
+    assert found.tolist() == values
+    assert reward(found, found[::-1], 0.7).tolist() == [
+        reward(a, b, 0.7) for a, b in zip(values, reversed(values), strict=True)
+    ]

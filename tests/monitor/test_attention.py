@@ -1,4 +1,4 @@
-"""Attention weights and focus shift against the paper's equations, applied by a loop."""
+"""Attention after dwells: weights, held target, focus shift and gaze class, against the paper's equations."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from shift_monitor.areas import NOWHERE
-from shift_monitor.attention import Attention, Dwell, dwelt, fresh, gaze_class, met_aoi, weights_after
+from shift_monitor.attention import Attention, Dwell, apply_dwell, gaze_class, initial_attention, mark_aoi_seen
 from shift_schemas.timestamps import NS
 from shift_study.study import AttentionSettings
 from support.monitor_sessions import began, fold, last, names, study
@@ -19,142 +19,96 @@ HOLD_NS = 60_000_000
 
 
 def by_the_paper(weights: list[float], target: int, step: float) -> list[float]:
-    """The paper's equation, literally; valid where no weight is at its floor."""
+    """Apply the paper's equation literally; it is valid where no weight is at its floor."""
     gained = min(weights[target] + step, 1.0) - weights[target]
     return [
         min(w + step, 1.0) if i == target else max(w - gained / (len(weights) - 1), 0.0) for i, w in enumerate(weights)
     ]
 
 
-def by_crumbs(weights: list[float], target: int, gain: float, floor: float) -> list[float]:
-    """The gain in ten thousand crumbs, each in equal parts from those above the floor."""
-    for _ in range(10_000):
-        givers = [i for i, w in enumerate(weights) if i != target and w > floor + 1e-12]
-        for i in givers:
-            weights[i] -= gain / 10_000 / len(givers)
-        if givers:
-            weights[target] += gain / 10_000
-    return weights
-
-
 def on(target: int, seconds: float, start_ns: int = 0) -> Dwell:
     return Dwell(target, start_ns, round(seconds * NS))
 
 
-def test_one_application_is_the_papers_equation_to_the_letter() -> None:
-    start = fresh(4)
-    after = dwelt(start, on(2, 0.1), HOLD_NS, 0, SETTINGS)
+def test_one_application_is_the_equation_of_the_paper() -> None:
+    start = initial_attention(4)
+    after = apply_dwell(start, on(2, 0.1), HOLD_NS, 0, SETTINGS)
     assert after.weights == pytest.approx(by_the_paper(list(start.weights), 2, 0.1), abs=1e-15)
 
 
-def test_at_the_floor_the_rest_is_taken_from_those_above_it() -> None:
-    after = weights_after((0.5, 0.02, 0.18, 0.3), 0, 0.2, 0.0)
-    assert after == pytest.approx((0.7, 0.0, 0.09, 0.21))
-
-
-@given(
-    parts=st.lists(st.floats(0.01, 1), min_size=2, max_size=6),
-    gain=st.floats(0, 1.5),
-    floor=st.sampled_from([0.0, 0.02, 0.05]),
-    data=st.data(),
-)
-def test_a_gain_is_what_many_small_ones_sum_to(
-    parts: list[float], gain: float, floor: float, data: st.DataObject
-) -> None:
-    weights = [floor + (1 - floor * len(parts)) * p / sum(parts) for p in parts]
-    target = data.draw(st.integers(0, len(parts) - 1))
-    after = weights_after(tuple(weights), target, gain, floor)
-    cut = data.draw(st.floats(0, 1))
-    twice = weights_after(weights_after(tuple(weights), target, gain * cut, floor), target, gain * (1 - cut), floor)
-    assert twice == pytest.approx(after, abs=1e-12)
-    assert sum(after) == pytest.approx(1.0, abs=1e-12)
-    assert min(after) >= floor - 1e-12
-
-
-def test_redistribution_is_that_of_a_loop_over_crumbs() -> None:
-    rng = random.Random(3)
-    for floor in (0.0, 0.04):
-        for _ in range(5):
-            parts = [rng.random() for _ in range(5)]
-            weights = [floor + (1 - 5 * floor) * p / sum(parts) for p in parts]
-            gain = rng.random()
-            after = weights_after(tuple(weights), 1, gain, floor)
-            assert after == pytest.approx(by_crumbs(weights, 1, gain, floor), abs=1e-3)
-
-
-def test_the_sum_does_not_drift_over_a_long_session() -> None:
+def test_sum_of_weights_does_not_drift_over_a_long_session() -> None:
     rng = random.Random(5)
-    attention = fresh(7)
+    attention = initial_attention(7)
     for n in range(20_000):
-        attention = dwelt(attention, on(rng.randrange(-1, 7), rng.random() / 20, n * NS), HOLD_NS, 0, SETTINGS)
+        attention = apply_dwell(attention, on(rng.randrange(-1, 7), rng.random() / 20, n * NS), HOLD_NS, 0, SETTINGS)
         assert abs(sum(attention.weights) - 1.0) <= 1e-12
 
 
-def test_a_single_aoi_keeps_its_weight() -> None:
-    attention = dwelt(fresh(1), on(0, 5.0), HOLD_NS, 0, SETTINGS)
+def test_single_aoi_keeps_its_weight() -> None:
+    attention = apply_dwell(initial_attention(1), on(0, 5.0), HOLD_NS, 0, SETTINGS)
     assert attention.weights == (1.0,)
-    assert gaze_class(met_aoi(attention), SETTINGS) == "focused"
+    assert gaze_class(mark_aoi_seen(attention), SETTINGS) == "focused"
 
 
-def test_gaze_on_no_aoi_leaves_the_weights_alone() -> None:
-    before = dwelt(fresh(3), on(0, 0.2), HOLD_NS, 0, SETTINGS)
-    after = dwelt(before, on(NOWHERE, 3.0, NS), HOLD_NS, 0, SETTINGS)
+def test_gaze_on_no_aoi_changes_no_weight() -> None:
+    before = apply_dwell(initial_attention(3), on(0, 0.2), HOLD_NS, 0, SETTINGS)
+    after = apply_dwell(before, on(NOWHERE, 3.0, NS), HOLD_NS, 0, SETTINGS)
     assert after.weights == before.weights
     assert after.held == NOWHERE
 
 
 def shifts(*targets: int, each_s: float = 0.1) -> list[float]:
-    """The focus shift after each dwell, one after the other, without what falls while a target is held."""
+    """Return the focus shift after each of these dwells; it does not fall while a target is held."""
     settings = AttentionSettings(shift_decrease=0.0)
-    attention, found = fresh(3), []
+    attention, found = initial_attention(3), []
     for n, target in enumerate(targets):
-        attention = dwelt(attention, on(target, each_s, round(n * each_s * NS)), HOLD_NS, 0, settings)
+        attention = apply_dwell(attention, on(target, each_s, round(n * each_s * NS)), HOLD_NS, 0, settings)
         found.append(attention.focus_shift)
     return found
 
 
-def test_the_first_target_is_no_focus_shift() -> None:
+def test_first_target_is_not_a_focus_shift() -> None:
     assert shifts(1) == [0.0]
     assert shifts(NOWHERE, 1) == [0.0, 0.0]
 
 
-def test_each_change_of_target_is_one_focus_shift_and_the_return_from_none_is_not() -> None:
+def test_change_of_target_is_one_focus_shift_and_return_from_none_is_not() -> None:
     assert shifts(0, 1, 1, 2) == pytest.approx([0.0, 0.2, 0.2, 0.4])
     assert shifts(0, NOWHERE, 1) == pytest.approx([0.0, 0.2, 0.2])
     assert shifts(0, NOWHERE, 0) == pytest.approx([0.0, 0.2, 0.2])
 
 
-def test_gaze_on_a_border_does_not_flicker() -> None:
+def test_gaze_on_a_border_causes_no_focus_shifts() -> None:
     assert shifts(*[0, 1] * 20, each_s=0.03)[-1] == 0.0
     assert shifts(0, 0, 1, 1, each_s=0.03)[-1] == pytest.approx(0.2)
 
 
-def test_a_pause_longer_than_the_gap_breaks_the_hold() -> None:
-    attention = dwelt(fresh(2), on(0, 0.1), HOLD_NS, NS, SETTINGS)
-    attention = dwelt(attention, on(1, 0.04, NS // 10), HOLD_NS, NS // 10, SETTINGS)
-    close = dwelt(attention, on(1, 0.04, NS // 5), HOLD_NS, NS // 10, SETTINGS)
-    far = dwelt(attention, on(1, 0.04, NS), HOLD_NS, NS // 10, SETTINGS)
+def test_pause_longer_than_the_gap_interrupts_the_hold() -> None:
+    attention = apply_dwell(initial_attention(2), on(0, 0.1), HOLD_NS, NS, SETTINGS)
+    attention = apply_dwell(attention, on(1, 0.04, NS // 10), HOLD_NS, NS // 10, SETTINGS)
+    close = apply_dwell(attention, on(1, 0.04, NS // 5), HOLD_NS, NS // 10, SETTINGS)
+    far = apply_dwell(attention, on(1, 0.04, NS), HOLD_NS, NS // 10, SETTINGS)
     assert (close.held, far.held) == (1, 0)
 
 
-def test_the_focus_shift_falls_while_a_target_is_held_and_stays_within_0_and_1() -> None:
+def test_focus_shift_falls_while_a_target_is_held_and_stays_within_0_and_1() -> None:
     attention = Attention((0.5, 0.5), focus_shift=0.95, held=0)
-    up = dwelt(attention, on(1, 0.06), HOLD_NS, 0, SETTINGS)
+    up = apply_dwell(attention, on(1, 0.06), HOLD_NS, 0, SETTINGS)
     assert up.focus_shift == 1.0
-    down = dwelt(up, on(1, 0.2, HOLD_NS), HOLD_NS, 0, SETTINGS)
+    down = apply_dwell(up, on(1, 0.2, HOLD_NS), HOLD_NS, 0, SETTINGS)
     assert down.focus_shift == pytest.approx(0.9)
-    assert dwelt(down, on(1, 60.0, NS), HOLD_NS, 0, SETTINGS).focus_shift == 0.0
+    assert apply_dwell(down, on(1, 60.0, NS), HOLD_NS, 0, SETTINGS).focus_shift == 0.0
 
 
 @given(st.lists(st.tuples(st.integers(-1, 2), st.integers(1, 40)), min_size=1, max_size=30), st.integers(1, 7))
-def test_finer_samples_of_the_same_gaze_leave_the_same(gaze: list[tuple[int, int]], finer: int) -> None:
-    """Dwell in units of 7 ms, as one sample each or cut into finer ones."""
+def test_finer_samples_of_the_same_gaze_give_the_same_attention(gaze: list[tuple[int, int]], finer: int) -> None:
+    """Dwell comes in units of 7 ms, as one sample each or cut into finer ones."""
 
     def after(cut: int) -> Attention:
-        attention, t_ns = fresh(3), 0
+        attention, t_ns = initial_attention(3), 0
         for target, units in gaze:
             for _ in range(cut):
-                attention = dwelt(attention, Dwell(target, t_ns, units * 7_000_000 // cut), HOLD_NS, 0, SETTINGS)
+                attention = apply_dwell(attention, Dwell(target, t_ns, units * 7_000_000 // cut), HOLD_NS, 0, SETTINGS)
                 t_ns += units * 7_000_000 // cut
         return attention
 
@@ -177,24 +131,24 @@ def test_finer_samples_of_the_same_gaze_leave_the_same(gaze: list[tuple[int, int
         ((0.49, 0.51 / 2, 0.51 / 2), 0.0, "uncertain"),
     ],
 )
-def test_the_class_has_fixed_thresholds_with_a_margin(weights: tuple[float, ...], shift: float, category: str) -> None:
-    assert gaze_class(Attention(weights, shift, met=True, dwell_ns=NS // 2), SETTINGS) == category
+def test_gaze_class_has_fixed_thresholds_with_a_margin(weights: tuple[float, ...], shift: float, category: str) -> None:
+    assert gaze_class(Attention(weights, shift, aoi_seen=True, dwell_ns=NS // 2), SETTINGS) == category
     assert gaze_class(Attention(weights, shift), SETTINGS) == "uncertain"
 
 
-def test_the_class_is_uncertain_until_half_a_second_of_dwell_on_aois() -> None:
-    enough = dwelt(met_aoi(fresh(2)), on(0, 0.5), HOLD_NS, 0, SETTINGS)
-    too_little = dwelt(met_aoi(fresh(2)), on(0, 0.499), HOLD_NS, 0, SETTINGS)
-    beside = dwelt(met_aoi(fresh(2)), on(NOWHERE, 5.0), HOLD_NS, 0, SETTINGS)
+def test_gaze_class_is_uncertain_until_half_a_second_of_dwell_on_aois() -> None:
+    enough = apply_dwell(mark_aoi_seen(initial_attention(2)), on(0, 0.5), HOLD_NS, 0, SETTINGS)
+    too_little = apply_dwell(mark_aoi_seen(initial_attention(2)), on(0, 0.499), HOLD_NS, 0, SETTINGS)
+    beside = apply_dwell(mark_aoi_seen(initial_attention(2)), on(NOWHERE, 5.0), HOLD_NS, 0, SETTINGS)
     assert [gaze_class(a, SETTINGS) for a in (enough, too_little, beside)] == ["focused", "uncertain", "uncertain"]
 
 
-def test_a_study_that_asks_for_no_dwell_has_a_class_from_the_first_sample_on() -> None:
-    assert gaze_class(met_aoi(fresh(2)), AttentionSettings(minimum_dwell_s=0.0)) == "focused"
-    assert gaze_class(fresh(2), AttentionSettings(minimum_dwell_s=0.0)) == "uncertain"
+def test_study_without_minimum_dwell_has_a_gaze_class_from_the_first_sample() -> None:
+    assert gaze_class(mark_aoi_seen(initial_attention(2)), AttentionSettings(minimum_dwell_s=0.0)) == "focused"
+    assert gaze_class(initial_attention(2), AttentionSettings(minimum_dwell_s=0.0)) == "uncertain"
 
 
-def test_an_aoi_name_stands_until_the_next_and_at_most_the_maximum() -> None:
+def test_aoi_name_stands_until_the_next_name_and_at_most_for_the_maximum() -> None:
     _, facts = fold(began(), names(0, [0.0, 0.3], ["left", "right"]))
     assert last(facts).gaze.weights == pytest.approx(
         {"left": 1 / 3 + 0.3, "middle": 1 / 3 - 0.15, "right": 1 / 3 - 0.15}
@@ -204,7 +158,7 @@ def test_an_aoi_name_stands_until_the_next_and_at_most_the_maximum() -> None:
     assert last(facts).gaze.weights["left"] == pytest.approx(1 / 3 + 0.1)
 
 
-def test_the_last_name_has_no_dwell_yet() -> None:
+def test_last_name_has_no_dwell_yet() -> None:
     state, facts = fold(began(), names(0, [0.0], ["left"]))
     assert last(facts).gaze.weights["left"] == pytest.approx(1 / 3)
     _, facts = fold(state, names(1, [0.2], ["left"]))

@@ -1,11 +1,11 @@
-"""Processing capacity against the paper's case equation."""
+"""Processing capacity over strategies and sessions, compared with the paper's case equation."""
 
 from __future__ import annotations
 
 import random
 
 import pytest
-from shift_monitor.capacity import Capacity, capacity_class, executed
+from shift_monitor.capacity import Capacity, apply_strategy
 from shift_study.study import CapacitySettings
 from support.monitor_sessions import AFFIRMATION, NEGATION, began, decision, fold, last, study
 
@@ -17,29 +17,29 @@ STRATEGIES = [
 ]
 
 
-def test_the_first_strategy_is_no_repetition() -> None:
-    assert executed(Capacity(1.0), AFFIRMATION, SETTINGS).value == pytest.approx(0.9)
+def test_first_strategy_is_not_a_repetition() -> None:
+    assert apply_strategy(Capacity(1.0), AFFIRMATION, SETTINGS).value == pytest.approx(0.9)
 
 
-def test_any_negation_costs_more_than_none() -> None:
-    assert executed(Capacity(1.0), NEGATION, SETTINGS).value == pytest.approx(0.8)
+def test_any_negation_costs_more_than_an_affirmation() -> None:
+    assert apply_strategy(Capacity(1.0), NEGATION, SETTINGS).value == pytest.approx(0.8)
     mixed = {"negation": "negation_affirmation", "hesitation": "none"}
-    assert executed(Capacity(1.0), mixed, SETTINGS).value == pytest.approx(0.8)
+    assert apply_strategy(Capacity(1.0), mixed, SETTINGS).value == pytest.approx(0.8)
 
 
-def test_another_level_of_one_strategy_is_another_strategy() -> None:
+def test_another_level_of_one_strategy_is_not_a_repetition() -> None:
     before = Capacity(0.5, AFFIRMATION)
-    assert executed(before, AFFIRMATION | {"hesitation": "hesitation"}, SETTINGS).value == pytest.approx(0.4)
-    assert executed(before, AFFIRMATION, SETTINGS).value == pytest.approx(0.8)
+    assert apply_strategy(before, AFFIRMATION | {"hesitation": "hesitation"}, SETTINGS).value == pytest.approx(0.4)
+    assert apply_strategy(before, AFFIRMATION, SETTINGS).value == pytest.approx(0.8)
 
 
-def test_it_follows_the_papers_equation_over_random_sessions() -> None:
+def test_capacity_follows_the_equation_of_the_paper_over_random_sessions() -> None:
     rng = random.Random(1)
     for _ in range(50):
         capacity, value, before = Capacity(1.0), 1.0, None
         for _ in range(100):
             strategy = rng.choice(STRATEGIES)
-            capacity = executed(capacity, strategy, SETTINGS)
+            capacity = apply_strategy(capacity, strategy, SETTINGS)
             if strategy == before:
                 value = min(value + 0.3, 1.0)
             elif strategy["negation"] == "affirmation":
@@ -50,13 +50,7 @@ def test_it_follows_the_papers_equation_over_random_sessions() -> None:
             assert capacity.value == value
 
 
-def test_high_begins_at_the_threshold_with_a_margin() -> None:
-    assert capacity_class(0.5, SETTINGS) == "high"
-    assert capacity_class(0.5 - 1e-10, SETTINGS) == "high"
-    assert capacity_class(0.5 - 1e-8, SETTINGS) == "low"
-
-
-def test_the_observation_follows_the_executed_strategies() -> None:
+def test_observation_follows_the_executed_strategies() -> None:
     _, facts = fold(
         began(), *(decision(n + 1, s) for n, s in enumerate([NEGATION, AFFIRMATION, NEGATION, AFFIRMATION]))
     )
@@ -65,7 +59,7 @@ def test_the_observation_follows_the_executed_strategies() -> None:
     assert last(facts).seen.decision == 4
 
 
-def test_costs_are_the_studys() -> None:
+def test_costs_come_from_the_study() -> None:
     settings = study(capacity={"other_cost": 0.4, "demanding": ["negation"]})
     _, facts = fold(began(settings), decision(1, {"negation": "negation_affirmation", "hesitation": "none"}))
     assert last(facts).capacity.value == pytest.approx(0.6)

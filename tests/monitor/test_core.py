@@ -1,4 +1,4 @@
-"""The monitor's fold: what it takes, what it refuses, and that its outputs can be derived again."""
+"""The monitor's fold: accepted and refused messages, and the reproduction of its outputs."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ from support.monitor_sessions import (
     study,
 )
 
-REAL = recording(RECORDINGS[2])  # the one with the most loss
+REAL = recording(RECORDINGS[2])  # the recording with the most loss
 
 
 # --- independence of chunking ---
@@ -53,7 +53,7 @@ REAL = recording(RECORDINGS[2])  # the one with the most loss
 
 @settings(max_examples=25, deadline=None)
 @given(cuts=st.lists(st.integers(1, 80), min_size=1, max_size=40), start=st.integers(0, len(REAL) - 300))
-def test_any_cut_of_the_same_samples_leaves_the_same_bit_for_bit(cuts: list[int], start: int) -> None:
+def test_any_cut_of_the_same_samples_gives_identical_results(cuts: list[int], start: int) -> None:
     taken = REAL[start : start + 300]
     whole, facts = played(taken, 300)
     parts, seq, at = [], 0, 0
@@ -73,7 +73,7 @@ def test_any_cut_of_the_same_samples_leaves_the_same_bit_for_bit(cuts: list[int]
     gaze=st.lists(st.tuples(st.integers(1, 1500), st.sampled_from(["left", "right", None])), min_size=2, max_size=40),
     n=st.integers(1, 10),
 )
-def test_any_cut_of_the_same_names_leaves_the_same_bit_for_bit(gaze: list[tuple[int, str | None]], n: int) -> None:
+def test_any_cut_of_the_same_names_gives_identical_results(gaze: list[tuple[int, str | None]], n: int) -> None:
     t, now = [], 0.0
     for wait_ms, _ in gaze:
         now += wait_ms / 1000
@@ -88,11 +88,11 @@ def spans(facts: list[Fact]) -> list[tuple[float, float, float, float, str]]:
     return [(f.start_s, f.duration_s, f.x, f.y, f.aoi) for f in fixations(facts)]
 
 
-# --- a session as it happens, and derived again ---
+# --- a live session, and its reproduction ---
 
 
 def a_session(seed: int) -> list[Message]:
-    """Real gaze with decisions, results, a new configuration, a source change, gaps, repeats and a late chunk."""
+    """Return real gaze with decisions, results, a configuration, a source change, gaps, repeats and a late chunk."""
     rng = random.Random(seed)
     gaze: list[GazeChunk] = list(chunks(REAL[:500], 10, "tx300"))
     late = gaze.pop(7)
@@ -114,7 +114,7 @@ def a_session(seed: int) -> list[Message]:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_state_that_was_written_and_read_again_goes_on_identically(seed: int) -> None:
+def test_dumped_and_loaded_state_continues_identically(seed: int) -> None:
     rng = random.Random(seed)
     state: MonitorState | None = None
     other: MonitorState | None = None
@@ -127,8 +127,8 @@ def test_a_state_that_was_written_and_read_again_goes_on_identically(seed: int) 
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_the_outputs_tell_their_inputs_and_fold_to_themselves(seed: int) -> None:
-    """What ``verify`` does: recorded gaze, decisions, results and configurations, in the order that `seen` tells."""
+def test_inputs_follow_from_outputs_and_give_the_same_outputs(seed: int) -> None:
+    """Fold recorded gaze, decisions, results and configurations in the order of ``seen``, as ``verify`` does."""
     events = a_session(seed)
     _, facts = fold(None, *events)
     decisions = {e.n: e for e in events if isinstance(e, Decision)}
@@ -159,7 +159,7 @@ def test_the_outputs_tell_their_inputs_and_fold_to_themselves(seed: int) -> None
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_applied_input_ends_in_one_observation_of_the_next_version(seed: int) -> None:
+def test_every_applied_input_publishes_one_observation_of_the_next_version(seed: int) -> None:
     state, version = None, 0
     for event in a_session(seed):
         done = step(state, event, NOW)
@@ -173,7 +173,7 @@ def test_every_applied_input_ends_in_one_observation_of_the_next_version(seed: i
         assert state.version == version
 
 
-def test_facts_carry_the_stamp_that_was_handed_in() -> None:
+def test_facts_carry_the_given_stamp() -> None:
     stamp = Stamp(sec=5, nsec=6)
     done = step(began(), names(0, [0.0], ["left"]), stamp)
     assert {f.stamp for f in done.facts} == {stamp}
@@ -182,7 +182,7 @@ def test_facts_carry_the_stamp_that_was_handed_in() -> None:
 # --- sessions and configurations ---
 
 
-def test_the_first_observation_is_that_of_the_first_configuration() -> None:
+def test_first_configuration_publishes_the_first_observation() -> None:
     state, facts = fold(None, session())
     assert facts == []
     assert state == initial(session())
@@ -196,7 +196,7 @@ def test_the_first_observation_is_that_of_the_first_configuration() -> None:
     assert observation.seen.config == 1
 
 
-def test_a_later_configuration_changes_settings_and_keeps_the_partner() -> None:
+def test_later_configuration_changes_settings_and_keeps_the_partner_model() -> None:
     state, _ = fold(began(), decision(1), names(0, [0.0, 0.2], ["left", "left"]))
     after, facts = fold(state, config(study(capacity={"threshold": 0.95}), version=2))
     assert after.attention == state.attention
@@ -204,14 +204,14 @@ def test_a_later_configuration_changes_settings_and_keeps_the_partner() -> None:
     assert last(facts).capacity.category == "low"
 
 
-def test_without_a_session_nothing_is_known() -> None:
+def test_message_without_a_session_is_refused() -> None:
     for event in (config(study()), names(0, [0.0], ["left"]), decision(1)):
         with pytest.raises(UnknownThing):
             step(None, event, NOW)
 
 
 @pytest.mark.parametrize("event", [names(0, [0.0], ["left"]), decision(1), performance(1, True, True)])
-def test_before_its_configuration_a_session_has_others_wait(event: Message) -> None:
+def test_message_before_the_configuration_waits(event: Message) -> None:
     state, _ = fold(None, session())
     with pytest.raises(NotYet):
         step(state, event, NOW)
@@ -219,14 +219,14 @@ def test_before_its_configuration_a_session_has_others_wait(event: Message) -> N
         step(state, event, NOW, late=True)
 
 
-def test_what_is_not_the_monitors_leaves_no_trace() -> None:
+def test_message_of_another_kind_changes_nothing() -> None:
     state = began()
     done = step(state, Marker(session="s1", stamp=NOW, marker_id="m1", text="hm"), NOW)
     assert (done.state, done.facts) == (state, ())
     assert step(state, session(), NOW).facts == ()
 
 
-def test_a_session_that_ends_ends_its_open_fixation_and_takes_no_more_gaze() -> None:
+def test_end_of_a_session_ends_the_open_fixation_and_refuses_more_gaze() -> None:
     t = [i / 100 for i in range(50)]
     state, facts = fold(began(), points(0, t, [0.5] * 50), session("ending"))
     assert len(fixations(facts)) == 1
@@ -235,7 +235,7 @@ def test_a_session_that_ends_ends_its_open_fixation_and_takes_no_more_gaze() -> 
         step(state, points(1, [1.0], [0.5]), NOW)
 
 
-def test_a_session_that_ends_before_its_configuration_just_ends() -> None:
+def test_session_that_ends_before_its_configuration_publishes_nothing() -> None:
     state, facts = fold(None, session(), session("ending"))
     assert (state.ended, facts) == (True, [])
 
@@ -255,7 +255,7 @@ def test_gaze_is_recorded_as_it_was_applied() -> None:
     assert fold(began(), gaze_chunk_of(gaze)) == (state, facts)
 
 
-def test_no_aoi_is_recorded_as_an_empty_name() -> None:
+def test_gaze_on_no_aoi_is_recorded_as_an_empty_name() -> None:
     state, facts = fold(began(), names(0, [0.0, 0.1], ["left", None]))
     gaze = facts[0]
     assert isinstance(gaze, Gaze)
@@ -263,7 +263,7 @@ def test_no_aoi_is_recorded_as_an_empty_name() -> None:
     assert fold(began(), gaze_chunk_of(gaze)) == (state, facts)
 
 
-def test_left_out_valid_is_where_x_and_y_are() -> None:
+def test_sample_without_valid_is_valid_where_x_and_y_are_given() -> None:
     _, facts = fold(began(), GazeChunk(source="a", seq=0, t=[0.0, 0.1], x=[0.1, 0.2], y=[0.2, None]))
     assert isinstance(facts[0], Gaze)
     assert facts[0].valid == [True, False]
@@ -282,7 +282,7 @@ def test_gaze_is_uncertain_before_the_first_valid_sample_on_an_aoi() -> None:
 # --- gaze: numbers, sources, clocks ---
 
 
-def test_a_repeat_is_answered_alike_and_ignored() -> None:
+def test_repeated_chunk_gets_the_same_reply_and_is_ignored() -> None:
     chunk = names(0, [0.0, 0.1], ["left", "left"])
     recorded = Recorded()
     state, facts = fold(began(), chunk, names(1, [0.2], ["right"]), recorded=recorded)
@@ -291,7 +291,7 @@ def test_a_repeat_is_answered_alike_and_ignored() -> None:
     assert again.result == {"accepted": 2, "source": "ros", "seq": 0, "observation": last(facts).version}
 
 
-def test_a_gap_is_counted() -> None:
+def test_missing_chunks_are_counted() -> None:
     state, facts = fold(began(), names(2, [0.0], ["left"]))
     assert last(facts).gaze.dropped == 2
     _, facts = fold(state, names(6, [0.1], ["left"]))
@@ -299,7 +299,7 @@ def test_a_gap_is_counted() -> None:
     assert last(facts).seen.gaze == {"ros": 6}
 
 
-def test_a_late_chunk_is_recorded_and_not_applied_and_its_repeat_ignored() -> None:
+def test_late_chunk_is_recorded_and_not_applied_and_its_repeat_is_ignored() -> None:
     recorded = Recorded()
     state, before = fold(began(), names(0, [0.0], ["left"]), names(3, [0.3], ["left"]), recorded=recorded)
     done = step(state, names(1, [0.1], ["right"]), NOW)
@@ -319,7 +319,7 @@ def test_a_late_chunk_is_recorded_and_not_applied_and_its_repeat_ignored() -> No
     assert len(step(done.state, names(2, [0.2], ["right"]), NOW).facts) == 2
 
 
-def test_a_late_chunk_of_any_of_two_hundred_gaps_is_recorded() -> None:
+def test_late_chunk_is_recorded_in_each_of_two_hundred_gaps() -> None:
     recorded = Recorded()
     read = [names(2 * n + 1, [float(n)], ["left"]) for n in range(200)]
     state, _ = fold(began(), *read, recorded=recorded)
@@ -331,7 +331,7 @@ def test_a_late_chunk_of_any_of_two_hundred_gaps_is_recorded() -> None:
     assert after.attention == state.attention
 
 
-def test_a_source_that_begins_to_speak_takes_over() -> None:
+def test_new_source_replaces_the_former_one() -> None:
     t = [i / 100 for i in range(50)]
     state, _ = fold(began(), points(4, [100 + s for s in t], [0.2] * 50, source="old"))
     state, facts = fold(state, names(0, [0.0], ["right"], source="new"))
@@ -342,7 +342,7 @@ def test_a_source_that_begins_to_speak_takes_over() -> None:
         step(state, points(5, [101.0], [0.2], source="old"), NOW)
 
 
-def test_a_source_can_change_from_points_to_names() -> None:
+def test_source_can_change_from_points_to_names() -> None:
     state, _ = fold(began(), points(0, [i / 100 for i in range(50)], [0.2] * 50, source="a"))
     state, facts = fold(state, names(1, [0.5, 0.7], ["right", "right"], source="a"))
     assert len(fixations(facts)) == 1
@@ -351,7 +351,7 @@ def test_a_source_can_change_from_points_to_names() -> None:
     assert last(facts).gaze.dropped == 0
 
 
-def test_a_time_that_does_not_rise_is_refused_and_changes_nothing() -> None:
+def test_time_that_does_not_rise_is_refused() -> None:
     state, _ = fold(began(), names(0, [0.0, 0.5], ["left", "left"]))
     with pytest.raises(MalformedMessage) as refused:
         step(state, names(1, [0.5], ["left"]), NOW)
@@ -361,7 +361,7 @@ def test_a_time_that_does_not_rise_is_refused_and_changes_nothing() -> None:
         step(state, names(1, [0.6, 0.6 + 1e-11], ["left", "left"]), NOW)
 
 
-def test_an_unknown_aoi_is_refused_with_the_names_that_the_study_has() -> None:
+def test_unknown_aoi_is_refused_and_the_known_ones_are_listed() -> None:
     with pytest.raises(MalformedMessage) as refused:
         step(began(), names(0, [0.0, 0.1], ["left", "cup"]), NOW)
     (error,) = refused.value.errors
@@ -369,14 +369,14 @@ def test_an_unknown_aoi_is_refused_with_the_names_that_the_study_has() -> None:
     assert "left, middle, right" in error.rule
 
 
-def test_a_point_off_the_screen_is_gaze_and_one_off_the_earth_is_not() -> None:
+def test_point_beside_the_stimulus_is_accepted_and_an_impossible_one_is_refused() -> None:
     _, facts = fold(began(), points(0, [0.0], [1.2]))
     assert last(facts).gaze.category == "uncertain"
     with pytest.raises(MalformedMessage):
         step(began(), points(0, [0.0], [1e300]), NOW)
 
 
-def test_the_longest_times_and_numbers_that_a_chunk_can_carry_are_taken() -> None:
+def test_largest_times_and_numbers_of_a_chunk_are_accepted() -> None:
     state, _ = fold(began(), names(0, [-1e11], ["left"]), names(2**53, [1e11], ["right"]))
     state, facts = fold(state, points(2**53, [i / 100 - 1e9 for i in range(30)], [0.5] * 30), session("ending"))
     assert last(facts).gaze.dropped == 2**53
@@ -390,7 +390,7 @@ samples = st.tuples(
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(samples, min_size=1, max_size=80), st.integers(1, 9))
-def test_no_gaze_brings_the_model_out_of_its_bounds(
+def test_any_gaze_keeps_the_model_within_its_bounds(
     gaze: list[tuple[float, float | None, float, bool]], n: int
 ) -> None:
     t, taken = 0.0, []
@@ -407,6 +407,6 @@ def test_no_gaze_brings_the_model_out_of_its_bounds(
     assert load(dump(state)) == state
 
 
-def test_session_is_the_only_event_that_begins_one() -> None:
+def test_session_message_begins_a_session() -> None:
     assert isinstance(session(), Session)
     assert step(None, session(), NOW).state == initial(session())

@@ -1,4 +1,4 @@
-"""Fixation detection on line against the same algorithm written plainly, over the whole recording at once."""
+"""Online fixation detection, compared with the plain algorithm over the whole recording at once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def degrees(value: float, size_cm: float) -> float:
 
 
 def segments(samples: list[Sample]) -> list[list[Plain]]:
-    """Valid samples with the time for which each stands, cut where none stands for longer than the gap."""
+    """Return valid samples with the time that each stands for, cut where no sample stands for longer than the gap."""
     gap_ns = round(SETTINGS.maximum_gap_s * NS)
     times = [round(s.t * NS) for s in samples]
     stands = [min(b - a, gap_ns) for a, b in pairwise(times)] + [0]
@@ -57,7 +57,7 @@ def small(window: list[Plain]) -> bool:
 
 
 def identified(segment: list[Plain]) -> list[tuple[float, float, float, float]]:
-    """I-DT as Salvucci & Goldberg (2000) print it."""
+    """Return the fixations by I-DT as Salvucci & Goldberg (2000) print it."""
     found, start = [], 0
     while start < len(segment):
         end = start + 2
@@ -82,7 +82,7 @@ def covered_ns(window: list[Plain]) -> int:
 
 
 @pytest.mark.parametrize("path", RECORDINGS, ids=lambda p: p.name)
-def test_on_line_it_finds_what_the_plain_algorithm_finds_in_the_whole_recording(path: Path) -> None:
+def test_online_detection_matches_the_plain_algorithm_over_the_whole_recording(path: Path) -> None:
     samples = recording(path)
     expected = [f for s in segments(samples) for f in identified(smoothed(s))]
     _, facts = played(samples, 10)
@@ -97,7 +97,7 @@ def steady(seconds: float, x: float = 0.5, start: float = 0.0) -> tuple[list[flo
     return [start + i / HZ for i in range(n)], [x] * n
 
 
-def test_gaze_that_stays_is_one_fixation_and_dwell_from_its_first_sample_on() -> None:
+def test_steady_gaze_is_one_fixation_with_dwell_from_its_first_sample() -> None:
     t, x = steady(0.5)
     _, facts = fold(began(), points(0, t, x), session("ending"))
     (found,) = fixations(facts)
@@ -107,14 +107,14 @@ def test_gaze_that_stays_is_one_fixation_and_dwell_from_its_first_sample_on() ->
     assert last(facts).gaze.weights["middle"] == pytest.approx(1 / 3 + 0.5 - 1 / HZ)
 
 
-def test_a_shorter_stay_than_the_minimum_is_none() -> None:
+def test_gaze_shorter_than_the_minimum_is_not_a_fixation() -> None:
     t, x = steady(0.05)
     _, facts = fold(began(), points(0, t, x), session("ending"))
     assert fixations(facts) == []
     assert last(facts).gaze.weights["middle"] == pytest.approx(1 / 3)
 
 
-def test_a_saccade_ends_one_fixation_and_begins_the_next() -> None:
+def test_saccade_ends_one_fixation_and_begins_the_next() -> None:
     t0, x0 = steady(0.3, 0.2)
     t1, x1 = steady(0.3, 0.8, start=0.3)
     _, facts = fold(began(), points(0, t0 + t1, x0 + x1), session("ending"))
@@ -124,7 +124,7 @@ def test_a_saccade_ends_one_fixation_and_begins_the_next() -> None:
 
 
 @pytest.mark.parametrize(("lost_s", "count"), [(0.05, 1), (0.07, 1), (0.09, 2), (0.3, 2)])
-def test_a_loss_longer_than_the_gap_ends_a_fixation_and_never_counts(lost_s: float, count: int) -> None:
+def test_loss_longer_than_the_gap_ends_a_fixation_and_is_not_dwell(lost_s: float, count: int) -> None:
     t0, x0 = steady(0.3)
     n = round(lost_s * HZ)
     lost = [0.3 + i / HZ for i in range(n)]
@@ -134,20 +134,20 @@ def test_a_loss_longer_than_the_gap_ends_a_fixation_and_never_counts(lost_s: flo
     assert last(facts).gaze.weights["middle"] == pytest.approx(1 / 3 + 0.6 - 1 / HZ)
 
 
-def test_a_sample_stands_for_the_maximum_gap_at_most() -> None:
+def test_sample_stands_for_the_maximum_gap_at_most() -> None:
     _, facts = fold(began(), points(0, [0.0, 0.1, 0.2, 0.3], [0.5] * 4), session("ending"))
     assert len(fixations(facts)) == 1
     assert last(facts).gaze.weights["middle"] == pytest.approx(1 / 3 + 3 * 0.075)
 
 
-def test_a_silence_long_enough_ends_a_fixation_as_a_loss_does() -> None:
+def test_pause_without_samples_ends_a_fixation_as_a_loss_does() -> None:
     t0, x0 = steady(0.3)
     t1, x1 = steady(0.3, start=0.6)
     _, facts = fold(began(), points(0, t0 + t1, x0 + x1), session("ending"))
     assert len(fixations(facts)) == 2
 
 
-def test_a_single_wild_sample_does_not_end_a_fixation() -> None:
+def test_single_outlier_does_not_end_a_fixation() -> None:
     t, x = steady(0.5)
     x[70] = 0.95
     _, facts = fold(began(), points(0, t, x), session("ending"))
@@ -155,7 +155,7 @@ def test_a_single_wild_sample_does_not_end_a_fixation() -> None:
     assert last(facts).gaze.weights["right"] < 1 / 3
 
 
-def test_a_camera_of_30_hz_leaves_the_weights_of_a_tracker_of_1000_hz() -> None:
+def test_camera_at_30_hz_gives_the_weights_of_a_tracker_at_1000_hz() -> None:
     def gaze(hz: int) -> dict[str, float]:
         t = [i / hz for i in range(round(1.5 * hz))]
         x: list[float | None] = [0.2 if s < 0.6 else 0.5 if s < 1.1 else 0.8 for s in t]
@@ -166,7 +166,7 @@ def test_a_camera_of_30_hz_leaves_the_weights_of_a_tracker_of_1000_hz() -> None:
     assert gaze(100) == pytest.approx(gaze(1000), abs=0.015)
 
 
-def test_gaze_far_beside_every_area_is_none_of_them() -> None:
+def test_gaze_beside_every_area_is_on_no_aoi() -> None:
     half = study(aois=[{"name": "left", "rectangle": [0, 0, 0.5, 1]}, {"name": "top", "rectangle": [0.5, 0, 1, 0.2]}])
     t, x = steady(0.5, 0.9)
     _, facts = fold(began(half), points(0, t, x), session("ending"))
@@ -175,7 +175,7 @@ def test_gaze_far_beside_every_area_is_none_of_them() -> None:
     assert [f.aoi for f in fixations(facts)] == [""]
 
 
-def test_what_it_keeps_is_bounded_at_any_rate() -> None:
+def test_memory_of_the_detector_is_bounded_at_any_rate() -> None:
     state = began(study(fixation={"minimum_duration_s": 100.0, "median_filter_s": 10.0}))
     for seq in range(30):
         t = [(seq * 100 + i) * 1e-6 for i in range(100)]

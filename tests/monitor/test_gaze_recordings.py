@@ -1,4 +1,4 @@
-"""Real eye movements: five recordings with blinks and loss, and the detector I2MC as the oracle."""
+"""Real eye movements: five recordings with blinks and loss; the detector I2MC is the reference."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def grid(columns: int, rows: int) -> Study:
     )
 
 
-def test_there_are_five_recordings() -> None:
+def test_five_recordings_are_present() -> None:
     assert len(RECORDINGS) == 5
 
 
 @pytest.mark.parametrize("path", RECORDINGS, ids=lambda p: p.name)
-def test_chunks_of_twenty_times_the_speed_leave_the_same_to_the_bit(path: Path) -> None:
+def test_chunks_twenty_times_as_long_give_identical_results(path: Path) -> None:
     samples = recording(path)
     slow_state, slow = played(samples, 10)
     fast_state, fast = played(samples, 200)
@@ -44,14 +44,14 @@ def test_chunks_of_twenty_times_the_speed_leave_the_same_to_the_bit(path: Path) 
 
 @pytest.mark.parametrize("phase", [0, 1, 2])
 @pytest.mark.parametrize("path", RECORDINGS, ids=lambda p: p.name)
-def test_every_third_sample_leaves_the_same_weights(path: Path, phase: int) -> None:
+def test_every_third_sample_gives_nearly_the_same_weights(path: Path, phase: int) -> None:
     samples = recording(path)
     assert difference(samples, samples[phase::3], study()) < 0.06
 
 
 @pytest.mark.parametrize("layout", [(1, 3), (2, 2), (4, 4)], ids=str)
 @pytest.mark.parametrize("path", RECORDINGS, ids=lambda p: p.name)
-def test_every_third_sample_leaves_nearly_the_same_weights_on_other_areas(path: Path, layout: tuple[int, int]) -> None:
+def test_every_third_sample_gives_nearly_the_same_weights_on_other_areas(path: Path, layout: tuple[int, int]) -> None:
     samples = recording(path)
     for phase in range(3):  # chosen: 0.1, one application; a fixation at the limit may be found or not
         assert difference(samples, samples[phase::3], grid(*layout)) < 0.1
@@ -63,7 +63,7 @@ def difference(samples: list[Any], thinned: list[Any], of: Study) -> float:
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_fixations_are_those_of_i2mc() -> None:
+def test_fixations_match_those_of_i2mc() -> None:
     shares = [agreement(path) for path in RECORDINGS]
     covered, within = [s[0] for s in shares], [s[1] for s in shares]
     assert np.mean(covered) >= 0.90, covered
@@ -72,7 +72,7 @@ def test_fixations_are_those_of_i2mc() -> None:
 
 
 def agreement(path: Path) -> tuple[float, float]:
-    """How much of I2MC's fixation time ours cover, and how much of ours lies within it; in milliseconds."""
+    """Return the share of I2MC's fixation time that ours covers, and the share of ours that lies within it."""
     np.random.seed(1)  # I2MC's k-means draws its first means from numpy's global generator
     table = pd.read_csv(path, sep="\t")
     found = I2MC(

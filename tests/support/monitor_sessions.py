@@ -1,4 +1,4 @@
-"""Sessions, studies and recordings for the monitor's tests: what several of them need."""
+"""Sessions, studies and recordings that several of the monitor's tests use."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def began(of: Study | None = None) -> MonitorState:
 
 
 class Recorded:
-    """Gaze that the monitor put out: what its journal would find again."""
+    """The gaze facts that the monitor published, looked up as its journal does."""
 
     def __init__(self) -> None:
         self.gaze: list[Gaze] = []
@@ -93,7 +93,7 @@ class Recorded:
 def fold(
     state: MonitorState | None, *events: Message, recorded: Recorded | None = None
 ) -> tuple[MonitorState, list[Fact]]:
-    """Step through events; gaze that ``recorded`` has, and that this fold puts out, is told from restarts."""
+    """Step through events; ``recorded`` and the gaze of this fold tell repeats from restarts."""
     facts: list[Fact] = []
     kept = recorded or Recorded()
     for event in events:
@@ -120,5 +120,5 @@ def recording(path: Path) -> list[Sample]:
 
 
 def played(taken: list[Sample], n: int, of: Study | None = None) -> tuple[MonitorState, list[Fact]]:
-    """A session of these samples in chunks of ``n``, from its start to its end."""
+    """Fold a session of these samples in chunks of ``n``, from its start to its end."""
     return fold(began(of), *chunks(taken, n), session("ending"))

@@ -1,6 +1,6 @@
-"""Areas of interest: on which one a point falls. Pure.
+"""Areas of interest: the area that a point falls on. Pure.
 
-Points are 0..1 from the upper left corner. Where areas overlap, the first counts (INTERFACE.md).
+Points are 0..1 from the upper left corner. Where areas overlap, the first one counts (INTERFACE.md).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Area(NamedTuple):
 
 
 def area_of(aoi: Aoi) -> Area:
-    """The area that a study's AOI describes."""
+    """Return the area that a study's AOI describes."""
     if aoi.rectangle is not None:
         left, top, right, bottom = aoi.rectangle
         return Area(left, top, right, bottom)
@@ -38,10 +38,10 @@ def area_of(aoi: Aoi) -> Area:
 
 
 def area_at(areas: Sequence[Area], x: float, y: float) -> int:
-    """Index of the first area that the point falls on, else ``NOWHERE``.
+    """Return the index of the first area that the point falls on, else ``NOWHERE``.
 
-    An area has its left and top edge and not its right and bottom one, so that neighbours share no
-    point; the stimulus's own last edge, 1.0, belongs to what lies along it.
+    An area includes its left and top edge and not its right and bottom one, so that neighbours share no point. The
+    last edge of the stimulus, 1.0, belongs to the areas along it.
     """
     if x == 1.0:
         x = _LAST
@@ -54,7 +54,7 @@ def area_at(areas: Sequence[Area], x: float, y: float) -> int:
 
 
 def _inside(corners: tuple[tuple[float, float], ...], x: float, y: float) -> bool:
-    """Even-odd rule: a ray to the right crosses the outline an odd number of times."""
+    """Apply the even-odd rule: a ray to the right from a point inside crosses the outline an odd number of times."""
     inside = False
     before_x, before_y = corners[-1]
     for corner_x, corner_y in corners:

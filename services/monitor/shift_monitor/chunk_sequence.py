@@ -1,6 +1,6 @@
-"""Chunk numbers of one segment of a gaze source: what is new, late or a restart, and what never came. Pure.
+"""Chunk numbers of one segment of a gaze source: which chunk is new, late or a restart, and how many are missing. Pure.
 
-A segment is what a source sent between two restarts of its clock or its numbering.
+A segment is everything that a source sends between two restarts of its clock or its numbering.
 """
 
 from __future__ import annotations
@@ -9,47 +9,50 @@ from dataclasses import dataclass
 from typing import Literal
 
 OVERTAKEN = 64
-"""Chosen: so many chunks may arrive after the one that began the segment and still be late; before that, a restart."""
+"""Chosen: a chunk may arrive this many numbers after the one that began the segment and still count as late.
+
+A number further below is a restart.
+"""
 
 Arrival = Literal["new", "late", "restart"]
 
 
 @dataclass(frozen=True, slots=True)
-class Numbering:
-    """How far a segment has been read."""
+class ChunkSequence:
+    """The numbers that were read of one segment."""
 
     last: int = -1
     first: int = 0
     """The number that the segment began with."""
 
 
-def arrival(numbering: Numbering, seq: int, used: bool, goes_on: bool) -> Arrival:
-    """Return what a chunk with this number is; the caller has seen that it is no repeat.
+def classify_arrival(sequence: ChunkSequence, seq: int, used: bool, continues: bool) -> Arrival:
+    """Return whether a chunk with this number is new, late or a restart; it is known not to be a repeat.
 
     Parameters
     ----------
     used
         Whether another chunk of the segment had this number.
-    goes_on
-        Whether the chunk is later, on the source's clock, than all that was read of the segment.
+    continues
+        Whether the chunk is later, on the source's clock, than everything that was read of the segment.
     """
-    if seq > numbering.last:
-        return "new" if goes_on else "restart"
-    if used or goes_on or seq < numbering.first - OVERTAKEN:
+    if seq > sequence.last:
+        return "new" if continues else "restart"
+    if used or continues or seq < sequence.first - OVERTAKEN:
         return "restart"
     return "late"
 
 
-def skipped(numbering: Numbering, seq: int) -> int:
+def missing_chunks(sequence: ChunkSequence, seq: int) -> int:
     """Return how many chunks are missing before a new one."""
-    return seq - numbering.last - 1
+    return seq - sequence.last - 1
 
 
-def read(numbering: Numbering, seq: int) -> Numbering:
-    """Return the numbering after a new chunk."""
-    return Numbering(seq, seq if numbering.last < 0 else numbering.first)
+def advance(sequence: ChunkSequence, seq: int) -> ChunkSequence:
+    """Return the sequence after a new chunk."""
+    return ChunkSequence(seq, seq if sequence.last < 0 else sequence.first)
 
 
-def began_anew(seq: int) -> Numbering:
-    """Return the numbering of a segment that begins with this number: nothing before it counts as missing."""
-    return Numbering(seq - 1, seq)
+def sequence_from(seq: int) -> ChunkSequence:
+    """Return the sequence of a segment that begins with this number: no chunk before it counts as missing."""
+    return ChunkSequence(seq - 1, seq)

@@ -1,7 +1,7 @@
-"""What became of a gaze source's time: lost, off the stimulus, in no fixation, on no AOI or on one. Pure.
+"""How the time of a gaze source divides: lost, off the stimulus, in no fixation, on no AOI, on an AOI. Pure.
 
-Time is that of the source's clock, from its first sample on, in integer nanoseconds. The time between two samples
-is lost as far as the earlier one does not stand for it (MODEL.md, section 1). A jump forward is no time.
+Time is counted in integer nanoseconds on the source's clock, from its first sample on. The time between two samples
+is lost as far as the earlier one does not stand for it (MODEL.md, section 1). A jump forward counts as no time.
 """
 
 from __future__ import annotations
@@ -10,61 +10,64 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 JUMP_NS = 60_000_000_000
-"""Chosen: a sample that comes more than a minute after the one before it tells of a jump or of a break."""
+"""Chosen: a sample more than a minute after the one before it means that the clock jumped or the source paused."""
 
 LOST, ON_STIMULUS, OFF_STIMULUS = 0, 1, 2
-"""What a sample is: lost, a point on the stimulus or an AOI name, a point beside the stimulus."""
+"""The kinds of samples: lost; a point on the stimulus or an AOI name; a point beside the stimulus."""
 
 
 class GazeAccount(NamedTuple):
-    """Time of one source, ns, all its segments together."""
+    """The time of one source in ns, summed over all its segments."""
 
     total_ns: int = 0
     covered_ns: int = 0
-    """Valid samples stand for it."""
+    """The time that valid samples stand for."""
     off_stimulus_ns: int = 0
     on_aoi_ns: int = 0
     off_aoi_ns: int = 0
     last_ns: int | None = None
-    """Time of the last sample of this segment."""
-    standing: int = LOST
-    """What that sample is."""
+    """The time of the last sample of this segment."""
+    kind: int = LOST
+    """The kind of that sample."""
     samples: int = 0
 
 
-def counted(account: GazeAccount, times: Sequence[int], standings: Iterable[int], longest_ns: int) -> GazeAccount:
+EMPTY_ACCOUNT = GazeAccount()
+
+
+def count_samples(account: GazeAccount, times: Sequence[int], kinds: Iterable[int], longest_ns: int) -> GazeAccount:
     """Return the account after these samples, each of which stands until the next one, at most ``longest_ns``."""
     total_ns, covered_ns, off_stimulus_ns = account.total_ns, account.covered_ns, account.off_stimulus_ns
-    last_ns, standing = account.last_ns, account.standing
-    for t_ns, this in zip(times, standings, strict=True):
+    last_ns, kind = account.last_ns, account.kind
+    for t_ns, this in zip(times, kinds, strict=True):
         if last_ns is not None and (passed_ns := t_ns - last_ns) <= JUMP_NS:
             total_ns += passed_ns
-            if standing != LOST:
-                stood_ns = passed_ns if passed_ns < longest_ns else longest_ns
-                covered_ns += stood_ns
-                if standing == OFF_STIMULUS:
-                    off_stimulus_ns += stood_ns
-        last_ns, standing = t_ns, this
+            if kind != LOST:
+                stands_ns = passed_ns if passed_ns < longest_ns else longest_ns
+                covered_ns += stands_ns
+                if kind == OFF_STIMULUS:
+                    off_stimulus_ns += stands_ns
+        last_ns, kind = t_ns, this
     return account._replace(
-        total_ns=total_ns, covered_ns=covered_ns, off_stimulus_ns=off_stimulus_ns, last_ns=last_ns, standing=standing,
+        total_ns=total_ns, covered_ns=covered_ns, off_stimulus_ns=off_stimulus_ns, last_ns=last_ns, kind=kind,
         samples=account.samples + len(times),
     )  # fmt: skip
 
 
-def dwelt(account: GazeAccount, on_aoi_ns: int, off_aoi_ns: int) -> GazeAccount:
-    """Return the account after so much dwell on an AOI and on none."""
+def count_dwell(account: GazeAccount, on_aoi_ns: int, off_aoi_ns: int) -> GazeAccount:
+    """Return the account after this much dwell on an AOI and on none."""
     return account._replace(
         on_aoi_ns=account.on_aoi_ns + on_aoi_ns, off_aoi_ns=account.off_aoi_ns + off_aoi_ns
     )  # fmt: skip
 
 
-def broken_off(account: GazeAccount) -> GazeAccount:
-    """Return the account before another segment: the last sample stands for nothing more."""
-    return account._replace(last_ns=None, standing=LOST)
+def end_segment(account: GazeAccount) -> GazeAccount:
+    """Return the account before another segment: the last sample stands for no more time."""
+    return account._replace(last_ns=None, kind=LOST)
 
 
 class Shares(NamedTuple):
-    """Shares of the source's time, 0..1; all 0 before there is any."""
+    """Shares of the source's time (0..1); all are 0 while there is no time."""
 
     lost: float
     unclassified: float
@@ -73,7 +76,7 @@ class Shares(NamedTuple):
 
 
 def shares(account: GazeAccount) -> Shares:
-    """Return the shares; what was not lost, in no fixation yet, is unclassified."""
+    """Return the shares; time that is neither lost nor in a fixation yet is unclassified."""
     total = account.total_ns
     if not total:
         return Shares(0.0, 0.0, 0.0, 0.0)

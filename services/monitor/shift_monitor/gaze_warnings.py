@@ -1,6 +1,7 @@
-"""What is accepted of gaze and may not be meant, or can have no effect, in sentences. Pure.
+"""Warnings about gaze that is accepted but is probably a mistake or can have no effect. Pure.
 
-Nothing here changes the model: a warning stands in the answer, in the recording and in the observation.
+A warning changes nothing of the model. It is part of the reply, of the recording and of the observation.
+Recordings are verified word for word, so the wording of a warning must not change.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from shift_schemas.timestamps import NS
 from shift_monitor.gaze_account import JUMP_NS, GazeAccount, shares
 
 WINDOW = 16
-"""Chosen: so many spacings of samples are looked at; their median says the rate, whatever one gap does."""
+"""Chosen: the number of sample spacings that are kept; their median gives the rate, which single gaps do not change."""
 ENOUGH = 4
-"""Chosen: of fewer spacings nothing is said."""
+"""Chosen: fewer spacings cause no warning."""
 SLOWEST_HZ, FASTEST_HZ = 1.0, 20_000.0
 """Chosen: no eye tracker is slower or faster; the fastest on the market samples at 2 kHz."""
 MOST = 0.5
-"""A larger share of the source's time, lost or off the stimulus, is told of."""
+"""Chosen: a larger share of lost or off-stimulus time causes a warning."""
 EARLIEST_NS = NS // 2
-"""Chosen: from so much time on, shares are told of; or from ten samples on, whatever their time."""
+"""Chosen: shares can cause a warning after this much time, or after ten samples."""
 
 
 def next_spacings(before: Sequence[int], last_ns: int | None, times: Sequence[int]) -> tuple[int, ...]:
@@ -34,14 +35,14 @@ def next_spacings(before: Sequence[int], last_ns: int | None, times: Sequence[in
 
 
 def jump_warnings(last_ns: int | None, first_ns: int) -> list[str]:
-    """Return the sentence about a clock that jumped forward."""
+    """Return the warning about a clock that jumped forward, if it did."""
     if last_ns is None or first_ns - last_ns <= JUMP_NS:
         return []
     return [f"the source's time jumps forward by {_s(first_ns - last_ns)} s; no gaze is assumed in between"]
 
 
 def rate_warnings(spacings: Sequence[int], points: bool, gap_ns: int) -> list[str]:
-    """Return sentences about a rate that is not plausible, and about points that can never make a fixation."""
+    """Return warnings about an implausible rate and about points that can never form a fixation."""
     if len(spacings) < ENOUGH:
         return []
     spacing_ns = median_low(spacings)
@@ -61,7 +62,7 @@ def rate_warnings(spacings: Sequence[int], points: bool, gap_ns: int) -> list[st
 
 
 def share_warnings(account: GazeAccount, points: bool, longest_ns: int) -> list[str]:
-    """Return sentences about gaze most of which is lost or off the stimulus; a sample stands for ``longest_ns``."""
+    """Return warnings about gaze that is mostly lost or off the stimulus; a sample stands for ``longest_ns``."""
     if account.samples < (ENOUGH if account.total_ns >= EARLIEST_NS else 10):
         return []
     found, share = [], shares(account)
@@ -80,7 +81,7 @@ def share_warnings(account: GazeAccount, points: bool, longest_ns: int) -> list[
 
 
 def clock_restart_warning(source: str, before_ns: int, first_ns: int, segment: int) -> str:
-    """Return the sentence about a clock that went back."""
+    """Return the warning about a clock that went back."""
     return (
         f"the time of gaze source {source} goes back from {_s(before_ns)} to {_s(first_ns)} s: segment {segment} of "
         "the source begins"
@@ -88,14 +89,14 @@ def clock_restart_warning(source: str, before_ns: int, first_ns: int, segment: i
 
 
 def number_restart_warning(source: str, before: int, seq: int, segment: int) -> str:
-    """Return the sentence about a numbering that began anew."""
+    """Return the warning about a numbering that began again."""
     return (
         f"gaze source {source} sends another chunk {seq} after chunk {before}: segment {segment} of the source begins"
     )
 
 
 def late_warning(seq: int, last: int) -> str:
-    """Return the sentence about a late chunk."""
+    """Return the warning about a late chunk."""
     return f"chunk {seq} comes after chunk {last}: it is recorded and not applied"
 
 

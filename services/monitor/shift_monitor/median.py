@@ -1,9 +1,9 @@
-"""A median filter over gaze samples, on line and in time, not in samples. Pure.
+"""An online median filter over gaze samples; its window is a time, not a number of samples. Pure.
 
-Each sample is replaced by the median, per coordinate, of the valid samples of its segment within half a
-window before and after it. So it comes out half a window late, and no later sample can change it: what
-comes out depends on the samples alone, not on how they are cut into chunks. (Median filtering keeps the
-edges of saccades; Juhola 1985, Comput. Biol. Med. 15(2), 73-84.)
+Each sample is replaced by the median, for each coordinate, of the valid samples of its segment within half a
+window before and after it. A filtered sample is ready half a window late, and no later sample can change it. So the
+result depends on the samples alone, not on how they are cut into chunks. Median filtering keeps the edges of
+saccades (Juhola 1985, Comput. Biol. Med. 15(2), 73-84).
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 Point = tuple[int, float, float, int]
-"""A gaze sample: t_ns on the source's clock, x and y 0..1, and for how long it stands, ns."""
+"""A gaze sample: its time on the source's clock (ns), x and y (0..1), and the duration that it stands for (ns)."""
 
 LONGEST_WINDOW = 256
-"""Chosen: samples that are kept at most, 30 ms at 8 kHz; a faster one comes out early instead."""
+"""Chosen: the most samples that are kept, 30 ms at 8 kHz; those of a faster source are ready early."""
 
 
 class Filter(NamedTuple):
-    """The samples within reach, of which the last ``waiting`` have not come out yet."""
+    """The samples within reach; the last ``waiting`` of them are not filtered yet."""
 
     points: tuple[Point, ...] = ()
     waiting: int = 0
@@ -27,29 +27,29 @@ class Filter(NamedTuple):
 EMPTY = Filter()
 
 
-def taken(filter: Filter, point: Point) -> Filter:
-    """The filter with one more sample, which waits."""
+def push(filter: Filter, point: Point) -> Filter:
+    """Return the filter with one more sample, which waits."""
     return Filter((*filter.points, point), filter.waiting + 1)
 
 
-def stood(filter: Filter, duration_ns: int) -> Filter:
-    """The filter once it is known for how long its newest sample stands."""
+def set_duration(filter: Filter, duration_ns: int) -> Filter:
+    """Return the filter with the duration of its newest sample, which is known once the next sample is there."""
     t_ns, x, y, _ = filter.points[-1]
     return Filter((*filter.points[:-1], (t_ns, x, y, duration_ns)), filter.waiting)
 
 
-def came_out(filter: Filter, now_ns: int, half_ns: int) -> tuple[Filter, list[Point]]:
-    """What no sample from ``now_ns`` on can change any more, filtered, and the filter without it."""
-    points, waiting, out = filter.points, filter.waiting, []
+def pop_ready(filter: Filter, now_ns: int, half_ns: int) -> tuple[Filter, list[Point]]:
+    """Return the rest of the filter, and the filtered samples that no sample from ``now_ns`` on can change."""
+    points, waiting, ready = filter.points, filter.waiting, []
     while waiting and (points[-waiting][0] + half_ns < now_ns or len(points) > LONGEST_WINDOW):
-        out.append(_filtered(points, len(points) - waiting, half_ns))
+        ready.append(_filtered(points, len(points) - waiting, half_ns))
         waiting -= 1
         points = _within_reach(points, waiting, now_ns - half_ns, half_ns)
-    return (Filter(points, waiting), out) if out else (filter, out)
+    return (Filter(points, waiting), ready) if ready else (filter, ready)
 
 
-def flushed(filter: Filter, half_ns: int) -> list[Point]:
-    """All that still waits, filtered: nothing will follow."""
+def flush(filter: Filter, half_ns: int) -> list[Point]:
+    """Return all samples that still wait, filtered, when no sample follows."""
     points = filter.points
     return [_filtered(points, i, half_ns) for i in range(len(points) - filter.waiting, len(points))]
 
@@ -72,7 +72,7 @@ def _median(values: list[float]) -> float:
 
 
 def _within_reach(points: tuple[Point, ...], waiting: int, since_ns: int, half_ns: int) -> tuple[Point, ...]:
-    """Without what is too old for the next sample that comes out and for all that follow it."""
+    """Return the points without those that are too old for the next filtered sample and for all that follow it."""
     if waiting:
         since_ns = min(since_ns, points[-waiting][0] - half_ns)
     first = 0

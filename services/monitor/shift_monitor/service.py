@@ -1,4 +1,4 @@
-"""The monitor's shell: what it takes in, by whom. The worker does the rest."""
+"""The monitor as a service: its core, the streams that it reads, and the lookup that its gaze needs."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from shift_monitor.core import MonitorState
 from shift_monitor.gaze_input import gaze_input
 
 
-def prepared(message: Any, recall: Recall) -> Any:
-    """Return a chunk of gaze with what was recorded under its number before."""
+def add_earlier_gaze(message: Any, recall: Recall) -> Any:
+    """Return a chunk of gaze with the records of its number; return any other message unchanged."""
     return gaze_input(message, recall) if isinstance(message, GazeChunk) else message
 
 
@@ -24,6 +24,6 @@ CORE: Core[MonitorState] = Core(
     dump=core.dump,
     load=core.load,
     reads=READS["monitor"],
-    prepare=prepared,
+    prepare=add_earlier_gaze,
     lookups={"gaze": ("source", "seq")},
 )

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from shift_model.vocabulary import GazeClass
 from shift_monitor.areas import NOWHERE
-from shift_monitor.attention import Attention, Dwell, dwelt, gaze_class
+from shift_monitor.attention import Attention, Dwell, apply_dwell, gaze_class
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.messages import GazeChunk, GazeView
 from shift_schemas.timestamps import NS
@@ -116,7 +116,7 @@ def _steady(
     until_ns = attention.until_ns or 0
     for start_ns in range(0, whole.duration_ns, longest_ns):
         dwell = Dwell(target, until_ns + start_ns, min(longest_ns, whole.duration_ns - start_ns))
-        attention = dwelt(attention, dwell, _hold_ns(study), 0, study.attention)
+        attention = apply_dwell(attention, dwell, _hold_ns(study), 0, study.attention)
     return (*looks, whole), attention
 
 
@@ -125,7 +125,7 @@ def _attention(study: Study, view: GazeView) -> Attention:
     held = study.aoi_names.index(view.aoi) if view.aoi else NOWHERE
     weights = tuple(view.weights[name] for name in study.aoi_names)
     dwell_ns = round((view.dwell_s or 0.0) * NS)
-    return Attention(weights, view.focus_shift, held, NOWHERE, LEAD_NS, 0, met=True, dwell_ns=dwell_ns)
+    return Attention(weights, view.focus_shift, held, NOWHERE, LEAD_NS, 0, aoi_seen=True, dwell_ns=dwell_ns)
 
 
 def _hold_ns(study: Study) -> int:

@@ -1,0 +1,201 @@
+"""One chunk of gaze, folded into the partner model. Pure.
+
+A chunk is a repeat, late, new, the first one of another source, or the first one of another segment of its source.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from shift_schemas.core_protocol import Step
+from shift_schemas.errors import Conflict
+from shift_schemas.messages import GazeChunk
+from shift_schemas.timestamps import NS, Stamp
+
+from shift_monitor.attention import forget_run
+from shift_monitor.chunk_sequence import (
+    Arrival,
+    ChunkSequence,
+    advance,
+    classify_arrival,
+    missing_chunks,
+    sequence_from,
+)
+from shift_monitor.fixation import finish
+from shift_monitor.gaze_account import end_segment
+from shift_monitor.gaze_checks import check_rise, check_samples
+from shift_monitor.gaze_input import GazeInput, find_repeated
+from shift_monitor.gaze_stream import IDLE, GazeStream, apply_fixation_dwell, apply_names, apply_points
+from shift_monitor.gaze_warnings import (
+    clock_restart_warning,
+    jump_warnings,
+    late_warning,
+    next_spacings,
+    number_restart_warning,
+    rate_warnings,
+    share_warnings,
+)
+from shift_monitor.prepared_study import PreparedStudy, prepare_study
+from shift_monitor.published import EndedFixation, fixation_fact, gaze_fact, gaze_result, publish
+from shift_monitor.state import MonitorState, study_in_force
+
+MOST_SOURCES = 256
+"""Chosen: the most gaze sources of one session; each is remembered, so that a former one can be refused."""
+
+LARGEST_COUNT = 2**53
+"""The largest count in a message (shift_schemas.messages)."""
+
+
+class Continuation(NamedTuple):
+    """The state and the stream that a chunk is applied to."""
+
+    state: MonitorState
+    stream: GazeStream
+    ended: list[EndedFixation]
+    """The fixations that ended before the chunk."""
+    warnings: list[str]
+
+
+def step_gaze(state: MonitorState, gaze: GazeInput, now: Stamp, late: bool) -> Step[MonitorState]:
+    """Apply one chunk of gaze, or answer a repeated one as before.
+
+    ``late`` says that the chunk no longer waits for the session's configuration. The errors are those of
+    ``shift_monitor.core.step``.
+    """
+    chunk = gaze.chunk
+    if state.ended:
+        raise Conflict(f"session {state.session} has ended")
+    prepared = study_in_force(state, late)
+    if (first := find_repeated(gaze)) is not None:
+        return Step(state, result=gaze_result(chunk, first.accepted, state.version, first.warnings), repeat=True)
+    _check_source(state, chunk)
+    check_samples(chunk, prepared)
+    times = [round(t * NS) for t in chunk.t]
+    check_rise(None, times, chunk)
+    stream = state.stream
+    if stream is None or stream.source != chunk.source:
+        return _apply_chunk(_switch_source(state, chunk), chunk, times, now)
+    match _arrival(state, stream, gaze, times):
+        case "late":
+            return _record_late(state, stream, chunk, now)
+        case "restart":
+            return _apply_chunk(_begin_segment(state, stream, chunk, times), chunk, times, now)
+        case "new":
+            check_rise(stream.last_ns, times, chunk)
+            return _apply_chunk(_continue_stream(state, stream, chunk), chunk, times, now)
+
+
+def close_stream(state: MonitorState) -> tuple[MonitorState, list[EndedFixation]]:
+    """Return the state when no more gaze comes from its source, and the open fixation, which ends."""
+    if state.stream is None:
+        return state, []
+    prepared, stream = prepare_study(state.study), state.stream
+    output = finish(stream.detector, prepared.rule)
+    attention, account = apply_fixation_dwell(state.attention, stream.account, output, prepared)
+    after = replace(
+        state,
+        attention=forget_run(attention),
+        stream=replace(stream, named=None, detector=IDLE, account=account),
+        fixations=state.fixations + len(output.found),
+    )
+    return after, [(stream.source, stream.segment, f) for f in output.found]
+
+
+# --- which stream a chunk belongs to ---
+
+
+def _check_source(state: MonitorState, chunk: GazeChunk) -> None:
+    if chunk.source in state.former:
+        current = state.stream.source if state.stream else ""
+        raise Conflict(f"gaze source {chunk.source} was replaced by {current}; begin again under another name")
+    if len(state.former) >= MOST_SOURCES and state.stream and state.stream.source != chunk.source:
+        raise Conflict(f"session {state.session} had {MOST_SOURCES} gaze sources replaced; it takes no more")
+
+
+def _arrival(state: MonitorState, stream: GazeStream, gaze: GazeInput, times: list[int]) -> Arrival:
+    seq, last_ns = gaze.chunk.seq, stream.last_ns
+    used = any(e.segment == stream.segment for e in gaze.earlier)
+    continues = last_ns is None or times[0] >= last_ns
+    if state.format == 1 and seq <= stream.numbering.last and not used:
+        return "late"  # format 1 does not look at the chunk's time
+    return classify_arrival(stream.numbering, seq, used, continues)
+
+
+def _switch_source(state: MonitorState, chunk: GazeChunk) -> Continuation:
+    """Replace the source in use by the chunk's source."""
+    state, ended = close_stream(state)
+    if (former := state.stream) is not None:
+        state = replace(state, former={**state.former, former.source: former.numbering.last})
+    return Continuation(state, GazeStream(chunk.source), ended, [])
+
+
+def _begin_segment(state: MonitorState, stream: GazeStream, chunk: GazeChunk, times: list[int]) -> Continuation:
+    """Begin another segment of a source that restarted its clock or its numbering; nothing is carried over."""
+    state, ended = close_stream(state)
+    sequence, segment = stream.numbering, stream.segment + 1
+    if chunk.seq > sequence.last:
+        assert stream.last_ns is not None
+        warning = clock_restart_warning(chunk.source, stream.last_ns, times[0], segment)
+        sequence = ChunkSequence(sequence.last, chunk.seq)
+    else:
+        warning = number_restart_warning(chunk.source, sequence.last, chunk.seq, segment)
+        sequence = sequence_from(chunk.seq)
+    after = replace(state, restarts=state.restarts + 1)
+    begun = GazeStream(stream.source, sequence, segment=segment, account=end_segment(stream.account))
+    return Continuation(after, begun, ended, [warning])
+
+
+def _continue_stream(state: MonitorState, stream: GazeStream, chunk: GazeChunk) -> Continuation:
+    """Continue a source; where it changes between points and AOI names, its open fixation ends."""
+    if stream.last_ns is not None and (chunk.aoi is None) == (stream.named is None):
+        return Continuation(state, stream, [], [])
+    state, ended = close_stream(state)
+    account = end_segment(state.stream.account if state.stream else stream.account)
+    fresh = GazeStream(stream.source, stream.numbering, segment=stream.segment, account=account)
+    return Continuation(state, fresh, ended, [])
+
+
+# --- what a chunk does ---
+
+
+def _record_late(state: MonitorState, stream: GazeStream, chunk: GazeChunk, now: Stamp) -> Step[MonitorState]:
+    """Record a late chunk, which changes nothing of the model."""
+    warnings = _recorded_warnings(state, [late_warning(chunk.seq, stream.numbering.last)])
+    after = replace(state, gaze_warnings=warnings)
+    facts = (gaze_fact(after, chunk, now, "late"),)
+    return publish(after, now, facts, gaze_result(chunk, 0, after.version + 1, warnings))
+
+
+def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: Stamp) -> Step[MonitorState]:
+    """Apply a chunk to its stream; publish the chunk, the fixations that ended and the observation."""
+    state, stream = onto.state, onto.stream
+    prepared = prepare_study(state.study)
+    dropped = min(state.dropped + missing_chunks(stream.numbering, chunk.seq), LARGEST_COUNT)
+    jumps = jump_warnings(stream.last_ns, times[0])
+    spacings = next_spacings(stream.spacings, stream.last_ns, times)
+    stream = replace(stream, numbering=advance(stream.numbering, chunk.seq), spacings=spacings)
+    if chunk.aoi is None:
+        stream, attention, found = apply_points(stream, state.attention, times, chunk, prepared)
+    else:
+        stream, attention, found = *apply_names(stream, state.attention, times, chunk.aoi, prepared), []
+    quality = _quality_warnings(stream, chunk.aoi is None, prepared)
+    warnings = _recorded_warnings(state, [*onto.warnings, *jumps, *quality])
+    after = replace(
+        state, stream=stream, attention=attention, dropped=dropped, fixations=state.fixations + len(found),
+        samples=state.samples + len(times), received=now, gaze_warnings=warnings,
+    )  # fmt: skip
+    ended = [*onto.ended, *((chunk.source, stream.segment, f) for f in found)]
+    facts = (gaze_fact(after, chunk, now, "applied"), *(fixation_fact(after, f, now) for f in ended))
+    return publish(after, now, facts, gaze_result(chunk, len(times), after.version + 1, warnings))
+
+
+def _quality_warnings(stream: GazeStream, points: bool, prepared: PreparedStudy) -> list[str]:
+    gap_ns = prepared.rule.gap_ns
+    rate = rate_warnings(stream.spacings, points, gap_ns)
+    return rate + share_warnings(stream.account, points, gap_ns if points else prepared.longest_ns)
+
+
+def _recorded_warnings(state: MonitorState, warnings: list[str]) -> tuple[str, ...]:
+    """Return the warnings as the session records them; a session of format 1 records none."""
+    return tuple(warnings) if state.format > 1 else ()

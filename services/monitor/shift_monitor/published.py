@@ -1,0 +1,113 @@
+"""The facts that the monitor publishes: observations, recorded gaze and fixations. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from shift_model.capacity import capacity_class
+from shift_schemas.core_protocol import Step
+from shift_schemas.messages import (
+    CapacityView,
+    Fact,
+    Fixation,
+    Gaze,
+    GazeChunk,
+    GazeOutcome,
+    GazeView,
+    Observation,
+    Seen,
+)
+from shift_schemas.timestamps import NS, Stamp
+
+from shift_monitor.areas import area_at
+from shift_monitor.attention import gaze_class
+from shift_monitor.awareness import awareness_views
+from shift_monitor.fixation import Found
+from shift_monitor.gaze_account import EMPTY_ACCOUNT, shares
+from shift_monitor.gaze_columns import recorded_columns
+from shift_monitor.prepared_study import name_of, prepare_study
+from shift_monitor.state import MonitorState
+
+EndedFixation = tuple[str, int, Found]
+"""A fixation that ended, with its source and segment."""
+
+
+def publish(
+    state: MonitorState, now: Stamp, facts: tuple[Fact, ...] = (), result: dict[str, Any] | None = None
+) -> Step[MonitorState]:
+    """Return a step that publishes these facts and, as the last one, the next observation."""
+    after = replace(state, version=state.version + 1)
+    return Step(after, (*facts, observation_of(after, now)), result or {})
+
+
+def observation_of(state: MonitorState, now: Stamp) -> Observation:
+    """Return the observation of the whole partner model."""
+    prepared = prepare_study(state.study)
+    study, attention = prepared.study, state.attention
+    return Observation(
+        session=state.session,
+        stamp=now,
+        seen=_seen(state),
+        version=state.version,
+        capacity=CapacityView(
+            value=state.capacity.value, category=capacity_class(state.capacity.value, study.capacity.threshold)
+        ),
+        gaze=GazeView(
+            category=gaze_class(attention, study.attention),
+            weights=dict(zip(prepared.names, attention.weights, strict=True)),
+            focus_shift=attention.focus_shift,
+            aoi=name_of(prepared, attention.held),
+            fixations=state.fixations,
+            dropped=state.dropped,
+            **(_gaze_quality(state, now) if state.format > 1 else {}),
+        ),
+        awareness=awareness_views(state.awareness, study.awareness),
+        warnings=[*state.gaze_warnings, *state.result_warnings],
+    )
+
+
+def gaze_fact(state: MonitorState, chunk: GazeChunk, now: Stamp, outcome: GazeOutcome) -> Gaze:
+    """Return the record of a chunk."""
+    return Gaze(
+        session=state.session, stamp=now, seen=_seen(state), source=chunk.source, seq=chunk.seq,
+        segment=state.stream.segment if state.stream else 0, outcome=outcome, t=chunk.t, **recorded_columns(chunk),
+        warnings=list(state.gaze_warnings),
+    )  # fmt: skip
+
+
+def fixation_fact(state: MonitorState, ended: EndedFixation, now: Stamp) -> Fixation:
+    """Return the record of a fixation that ended."""
+    source, segment, (start_ns, end_ns, x, y) = ended
+    prepared = prepare_study(state.study)
+    return Fixation(
+        session=state.session, stamp=now, seen=_seen(state), source=source, segment=segment, start_s=start_ns / NS,
+        duration_s=(end_ns - start_ns) / NS, x=x, y=y, aoi=name_of(prepared, area_at(prepared.areas, x, y)),
+    )  # fmt: skip
+
+
+def gaze_result(chunk: GazeChunk, accepted: int, observation: int, warnings: tuple[str, ...]) -> dict[str, Any]:
+    """Return the reply to a chunk; ``observation`` is the version that contains it."""
+    result: dict[str, Any] = {
+        "accepted": accepted, "source": chunk.source, "seq": chunk.seq, "observation": observation,
+    }  # fmt: skip
+    return {**result, "warnings": list(warnings)} if warnings else result
+
+
+def _gaze_quality(state: MonitorState, now: Stamp) -> dict[str, Any]:
+    """Return the quality of gaze, which a session of format 1 does not record."""
+    share = shares(state.stream.account if state.stream else EMPTY_ACCOUNT)
+    received = state.received
+    return {
+        "restarts": state.restarts, "samples": state.samples, "dwell_s": state.attention.dwell_ns / NS,
+        "lost": share.lost, "unclassified": share.unclassified, "off_aoi": share.off_aoi,
+        "off_stimulus": share.off_stimulus, "received": received,
+        "age_s": None if received is None else max(now.ns - received.ns, 0) / NS,
+    }  # fmt: skip
+
+
+def _seen(state: MonitorState) -> Seen:
+    gaze = dict(state.former)
+    if state.stream is not None:
+        gaze[state.stream.source] = state.stream.numbering.last
+    return Seen(gaze=gaze, decision=state.decision, performance=state.performance, config=state.config)

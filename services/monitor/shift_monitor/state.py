@@ -1,0 +1,88 @@
+"""The state of the monitor: the partner model of one session, and its JSON form. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from pydantic import TypeAdapter
+from shift_schemas.core_protocol import NotYet
+from shift_schemas.errors import Unavailable
+from shift_schemas.messages import Session
+from shift_schemas.timestamps import Stamp
+
+from shift_monitor.attention import Attention
+from shift_monitor.awareness import History
+from shift_monitor.capacity import Capacity
+from shift_monitor.gaze_stream import GazeStream
+from shift_monitor.prepared_study import PreparedStudy, prepare_study
+
+CONFIG_WAIT_S = 0.2
+"""How long a message waits for the session's configuration, s (DESIGN.md, "Read your own writes")."""
+
+UNSET_CAPACITY, UNSET_ATTENTION = Capacity(0.0), Attention(())
+"""The values before the first configuration, which sets the start values."""
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorState:
+    """The partner model of one session. ``load(dump(state)) == state``."""
+
+    session: str
+    study: str = ""
+    """The study in force as ``config`` carries it; empty before the first configuration."""
+    ended: bool = False
+    version: int = 0
+    capacity: Capacity = UNSET_CAPACITY
+    attention: Attention = UNSET_ATTENTION
+    awareness: dict[str, History] = field(default_factory=dict)
+    stream: GazeStream | None = None
+    former: dict[str, int] = field(default_factory=dict)
+    """The sources that were replaced, each with the number of its last chunk."""
+    fixations: int = 0
+    dropped: int = 0
+    restarts: int = 0
+    samples: int = 0
+    received: Stamp | None = None
+    """When the last applied sample was received."""
+    format: int = 1
+    """The format of the session's recording (``shift_schemas.messages.FORMAT``)."""
+    gaze_warnings: tuple[str, ...] = ()
+    result_warnings: tuple[str, ...] = ()
+    decision: int = 0
+    performance: int = 0
+    config: int = 0
+
+
+_STATE = TypeAdapter(MonitorState)
+
+
+def initial(event: Session) -> MonitorState:
+    """Return the state at the start of a session, before its configuration."""
+    return MonitorState(event.session, format=event.format)
+
+
+def dump(state: MonitorState) -> str:
+    """Return the state as JSON; floats keep every digit."""
+    return _STATE.dump_json(state).decode()
+
+
+def load(text: str) -> MonitorState:
+    """Return the state that :func:`dump` wrote."""
+    return _STATE.validate_json(text)
+
+
+def study_in_force(state: MonitorState, late: bool) -> PreparedStudy:
+    """Return the session's prepared study.
+
+    Raises
+    ------
+    NotYet
+        The session's configuration has not come yet.
+    Unavailable
+        The same, but ``late`` is set: there is no more waiting.
+    """
+    if state.study:
+        return prepare_study(state.study)
+    if not late:
+        raise NotYet(("recorder",), CONFIG_WAIT_S)
+    raise Unavailable(f"the monitor has not read the configuration of session {state.session} yet")
