@@ -7,7 +7,6 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shift_cli.gaze_files import Sample, chunks
 from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
 from shift_monitor.gaze_input import gaze_input
 from shift_schemas.core_protocol import InputsMissing
@@ -25,6 +24,7 @@ from shift_schemas.messages import (
     Session,
 )
 from shift_schemas.timestamps import Stamp
+from shift_sources.files.samples import Sample, chunks
 from support.monitor_sessions import (
     NEGATION,
     NOW,

@@ -5,37 +5,39 @@ from __future__ import annotations
 import asyncio
 
 
-class Progress:
-    """Counts what arrived and what is done with."""
+class Completion:
+    """Counts what a queue received and what it finished."""
 
     def __init__(self) -> None:
-        self._arrived = 0
-        self._handled = 0
-        self._moved = asyncio.Event()
+        self._received = 0
+        self._finished = 0
+        self._changed = asyncio.Event()
 
-    def came(self) -> None:
-        """One more has arrived."""
-        self._arrived += 1
+    def receive(self) -> None:
+        """Count one more item."""
+        self._received += 1
 
-    def done(self, count: int = 1) -> None:
-        """``count`` more are done with."""
-        self._handled += count
-        self._moved.set()
+    def finish(self, count: int = 1) -> None:
+        """Count ``count`` items as finished."""
+        self._finished += count
+        self._changed.set()
 
     @property
-    def quiet(self) -> bool:
+    def idle(self) -> bool:
         """Whether nothing waits."""
-        return self._handled >= self._arrived
+        return self._finished >= self._received
 
-    async def passed(self, wait_s: float) -> bool:
-        """Wait until what has arrived by now is done with, ``wait_s`` at most; whether it is."""
-        mark = self._arrived
-        loop = asyncio.get_running_loop()
-        until = loop.time() + wait_s
-        while self._handled < mark:
-            self._moved.clear()
-            try:
-                await asyncio.wait_for(self._moved.wait(), until - loop.time())
-            except TimeoutError:
-                return False
+    async def wait(self, timeout_s: float) -> bool:
+        """Wait until everything that was received before this call is finished.
+
+        Returns whether it is, after ``timeout_s`` seconds at most.
+        """
+        mark = self._received
+        try:
+            async with asyncio.timeout(timeout_s):
+                while self._finished < mark:
+                    self._changed.clear()
+                    await self._changed.wait()
+        except TimeoutError:
+            return False
         return True
