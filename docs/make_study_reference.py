@@ -7,16 +7,16 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from shift_study.study import (
+from shift_study.constants import (
     AttentionSettings,
     AwarenessSettings,
     CapacitySettings,
     DeciderSettings,
     FixationSettings,
-    LearnerSettings,
     RewardSettings,
-    StrategySettings,
 )
+from shift_study.learner_settings import LearnerSettings
+from shift_study.scoring_table import StrategySettings
 
 PAGE = Path(__file__).with_name("study.md")
 BEGIN, END = "<!-- tables: made by docs/make_study_reference.py -->", "<!-- end of tables -->"

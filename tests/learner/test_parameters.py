@@ -9,8 +9,8 @@ import pytest
 from shift_learner.learner import Context, Taken
 from shift_learner.learners import LEARNERS, planner
 from shift_learner.learners.planning.engine import model_of
-from shift_study.checks import LEARNER_PARAMETERS
-from shift_study.study import LearnerSettings, Study
+from shift_study.learner_settings import LearnerSettings, parameters_of
+from shift_study.study import Study
 
 
 class Watched(LearnerSettings):
@@ -42,4 +42,4 @@ def test_a_learner_reads_the_parameters_that_are_said_to_have_an_effect(
         learner.needs_following(context)
         memory = learner.on_decision(context, memory, one)
         memory = learner.on_reward(context, memory, one, 0.5, following)
-    assert LEARNER_PARAMETERS[name] == READ
+    assert parameters_of(name) == READ

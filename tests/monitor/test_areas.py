@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 from shift_monitor.areas import NOWHERE, area_at, area_of
-from shift_study.study import Aoi, Study
+from shift_study.areas import Aoi
+from shift_study.study import Study
 
 THIRDS = [area_of(a) for a in Study(study="default").aois]
 

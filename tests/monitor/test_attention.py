@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shift_monitor.areas import NOWHERE
 from shift_monitor.attention import Attention, Dwell, apply_dwell, gaze_class, initial_attention, mark_aoi_seen
 from shift_schemas.timestamps import NS
-from shift_study.study import AttentionSettings
+from shift_study.constants import AttentionSettings
 from support.monitor_sessions import began, fold, last, names, study
 
 SETTINGS = AttentionSettings()

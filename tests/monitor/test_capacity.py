@@ -6,7 +6,7 @@ import random
 
 import pytest
 from shift_monitor.capacity import Capacity, apply_strategy
-from shift_study.study import CapacitySettings
+from shift_study.constants import CapacitySettings
 from support.monitor_sessions import AFFIRMATION, NEGATION, began, decision, fold, last, study
 
 SETTINGS = CapacitySettings()

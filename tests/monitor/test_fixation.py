@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from shift_schemas.timestamps import NS
 from shift_sources.files.samples import Sample
-from shift_study.study import FixationSettings
+from shift_study.constants import FixationSettings
 from support.monitor_sessions import RECORDINGS, began, fixations, fold, last, played, points, recording, session, study
 
 Plain = tuple[int, float, float, int]

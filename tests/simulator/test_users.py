@@ -12,7 +12,8 @@ from shift_schemas.errors import InvalidSettings
 from shift_simulator.simulated_person import person, task_names
 from shift_simulator.users import User, paper_user, parse_user, true_capacity
 from shift_study.scoring import reduce
-from shift_study.study import ScoringSettings, Study
+from shift_study.scoring_table import ScoringSettings
+from shift_study.study import Study
 
 SCORING = ScoringSettings.model_validate({})
 STUDY = Study(study="s")

@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from shift_monitor.areas import area_at, area_of
 from shift_schemas.errors import InvalidStudy
 from shift_study.area_checks import area_mistakes, area_warnings
+from shift_study.areas import Aoi
+from shift_study.constants import FixationSettings
 from shift_study.loading import given_study, parse_study, patched, study_from_json, study_json, study_of
-from shift_study.study import Aoi, FixationSettings, Study
+from shift_study.study import Study
 
 Corners = list[list[float]]
 BOW_TIE: Corners = [[0.2, 0.2], [0.8, 0.8], [0.8, 0.2], [0.2, 0.8]]

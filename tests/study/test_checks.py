@@ -7,9 +7,10 @@ from typing import Any
 import pytest
 from shift_model.vocabulary import LearnerName
 from shift_schemas.errors import InvalidStudy
-from shift_study.checks import LEARNER_PARAMETERS, PLAUSIBLE, study_mistakes, study_warnings
+from shift_study.checks import PLAUSIBLE, study_mistakes, study_warnings
+from shift_study.learner_settings import LEARNER_SETTINGS, LearnerSettings, parameters_of
 from shift_study.loading import parse_study, study_data, study_of
-from shift_study.study import LearnerSettings, Study
+from shift_study.study import Study
 
 
 def warned(**parts: Any) -> tuple[str, ...]:
@@ -106,9 +107,11 @@ def test_a_parameter_that_one_condition_s_learner_reads_has_an_effect() -> None:
     assert sentence.startswith("conditions.control.learner.epsilon has no effect: scoring takes no notice of it")
 
 
-def test_every_parameter_is_some_learner_s() -> None:
-    assert set(LEARNER_PARAMETERS) == set(LearnerName.__args__)
-    assert frozenset().union(*LEARNER_PARAMETERS.values()) == set(LearnerSettings.model_fields) - {"name"}
+def test_every_parameter_belongs_to_a_learner() -> None:
+    assert set(LEARNER_SETTINGS) == set(LearnerName.__args__)
+    assert frozenset().union(*(parameters_of(name) for name in LEARNER_SETTINGS)) == set(
+        LearnerSettings.model_fields
+    ) - {"name"}
 
 
 # --- units, cells and shapes in what is refused ---

@@ -17,7 +17,8 @@ from shift_study.loading import (
     study_json,
     study_of,
 )
-from shift_study.study import CHANGEABLE, Study, fixed_changes, merge_patch
+from shift_study.patching import merge_patch
+from shift_study.study import CHANGEABLE, Study, fixed_changes
 from support.message_strategies import json_values
 from support.study_texts import CONTRACT, OUT_OF_RANGE, PACE, SHOWN, written
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from shift_study.study import Aoi
+from shift_study.areas import Aoi
 
 NOWHERE = -1
 """The index that stands for no AOI."""

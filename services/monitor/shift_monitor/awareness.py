@@ -11,7 +11,7 @@ from functools import lru_cache
 
 from shift_model.awareness import awareness_class, success_ratio
 from shift_schemas.messages import AwarenessView, Performance
-from shift_study.study import AwarenessSettings
+from shift_study.constants import AwarenessSettings
 
 HISTORY_LENGTH = 10_000
 """The largest ``awareness.window`` of a study (shift_study.study)."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from shift_model.capacity import next_capacity, strategy_cost
 from shift_schemas.messages import Strategy
-from shift_study.study import CapacitySettings
+from shift_study.constants import CapacitySettings
 
 
 @dataclass(frozen=True, slots=True)

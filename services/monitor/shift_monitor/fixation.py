@@ -11,7 +11,7 @@ from math import atan, degrees
 from typing import NamedTuple
 
 from shift_schemas.timestamps import NS
-from shift_study.study import FixationSettings
+from shift_study.constants import FixationSettings
 
 from shift_monitor.median import EMPTY, Filter, Point, flush, pop_ready, push, set_duration
 

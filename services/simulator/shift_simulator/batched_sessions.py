@@ -15,7 +15,8 @@ from shift_model.reward import reward as reward_of
 from shift_model.reward import task_performance
 from shift_model.vocabulary import AWARENESSES, GAZES
 from shift_schemas.errors import InvalidSettings
-from shift_study.study import CapacitySettings, RewardSettings, Study
+from shift_study.constants import CapacitySettings, RewardSettings
+from shift_study.study import Study
 
 from shift_simulator.batched_learners import BatchLearner
 from shift_simulator.random_streams import Bools, Draws, Floats, Ints, draws_of, index

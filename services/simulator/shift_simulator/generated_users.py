@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from shift_model.vocabulary import TRIPLES
 from shift_study.scoring import suggestions
-from shift_study.study import ScoringSettings
+from shift_study.scoring_table import ScoringSettings
 
 from shift_simulator.random_streams import Bools, Floats, Ints
 from shift_simulator.users import ACTIONS, User

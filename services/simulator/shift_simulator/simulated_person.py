@@ -15,7 +15,8 @@ from shift_model.capacity import capacity_class, next_capacity
 from shift_model.random_numbers import uniform
 from shift_model.vocabulary import GAZES, GazeClass, Triple
 from shift_schemas.errors import InvalidSettings
-from shift_study.study import CapacitySettings, Study
+from shift_study.constants import CapacitySettings
+from shift_study.study import Study
 
 from shift_simulator.batched_sessions import action_costs
 from shift_simulator.random_streams import (

@@ -16,8 +16,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from shift_model.vocabulary import TRIPLES, Triple
 from shift_schemas.errors import InvalidSettings, field_errors, shorten
 from shift_schemas.ids import Id
+from shift_study.constants import CapacitySettings
+from shift_study.fields import Level, NonNegative, Probability
 from shift_study.scoring import suggestions
-from shift_study.study import CapacitySettings, Level, NonNegative, Probability, ScoringSettings, Study
+from shift_study.scoring_table import ScoringSettings
+from shift_study.study import Study
 
 ACTIONS = 6
 DEVIATION = 0.05

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from shift_schemas.errors import FieldError
 
-from shift_study.study import Aoi, FixationSettings
+from shift_study.areas import Aoi
+from shift_study.constants import FixationSettings
 
 if TYPE_CHECKING:
     from shapely.geometry.base import BaseGeometry

@@ -14,23 +14,11 @@ from shift_model.vocabulary import TRIPLES
 from shift_schemas.errors import FieldError
 
 from shift_study.area_checks import area_mistakes, area_warnings
+from shift_study.learner_settings import LEARNER_SETTINGS, LearnerSettings, parameters_of
 from shift_study.loading import study_in_force
 from shift_study.scoring import scores
-from shift_study.study import LearnerSettings, ScoringTable, Study
-
-PRIOR = frozenset({"scoring_prior", "prior_value"})
-LEARNER_PARAMETERS: dict[str, frozenset[str]] = {
-    "scoring": frozenset(),
-    "q-learning": PRIOR | {"learning_rate", "discount", "epsilon"},
-    "epsilon-greedy": PRIOR | {"epsilon"},
-    "ucb1": PRIOR | {"exploration"},
-    "thompson": frozenset({"scoring_prior", "prior_strength", "thompson_states"}),
-    "linear-thompson": PRIOR | {"prior_strength", "noise"},
-    "planner": frozenset(
-        {"scoring_prior", "planning_horizon", "planning_discount", "flip_probability", "change_probability"}
-    ),
-}
-"""Which parameters a learner reads; it takes no notice of the others."""
+from shift_study.scoring_table import ScoringTable
+from shift_study.study import Study
 
 
 class Plausible(NamedTuple):
@@ -128,11 +116,11 @@ def _unused_parameters(study: Study) -> Iterator[str]:
     in_force = {name: study_in_force(study, name).learner for name in study.conditions}
     learners = {study.learner.name, *(settings.name for settings in in_force.values())}
     for key in _given(study.learner):
-        if not any(key in LEARNER_PARAMETERS[name] for name in learners):
+        if not any(key in parameters_of(name) for name in learners):
             yield _no_effect(f"learner.{key}", sorted(learners), key)
     for condition, settings in in_force.items():
         for key in _written(study.conditions[condition].get("learner")):
-            if key not in LEARNER_PARAMETERS[settings.name]:
+            if key not in parameters_of(settings.name):
                 yield _no_effect(f"conditions.{condition}.learner.{key}", [settings.name], key)
 
 
@@ -152,7 +140,7 @@ def _written(patch: Any) -> list[str]:
 
 
 def _no_effect(path: str, learners: list[str], key: str) -> str:
-    readers = [name for name, keys in LEARNER_PARAMETERS.items() if key in keys]
+    readers = [name for name in LEARNER_SETTINGS if key in parameters_of(name)]
     return (
         f"{path} has no effect: {', '.join(learners)} takes no notice of it; it is a parameter of {', '.join(readers)}"
     )

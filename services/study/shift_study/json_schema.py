@@ -10,7 +10,8 @@ import json
 import sys
 from typing import Any
 
-from shift_study.study import CONDITIONAL, DEFAULT_STRATEGIES, Study
+from shift_study.scoring_table import DEFAULT_STRATEGIES
+from shift_study.study import CONDITIONAL, Study
 
 Schema = dict[str, Any]
 TITLE = "A study of the SHIFT mesh"

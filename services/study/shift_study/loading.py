@@ -15,8 +15,10 @@ from shift_schemas.suggestions import did_you_mean
 
 from shift_study.area_checks import area_mistakes
 from shift_study.mistakes import MISTAKES, Lines, Mistake, mistakes_of, refusal
+from shift_study.patching import merge_patch
+from shift_study.scoring_table import DEFAULT_STRATEGIES, DEFAULT_TABLE
 from shift_study.shape import Path
-from shift_study.study import DEFAULT_STRATEGIES, DEFAULT_TABLE, Study, merge_patch
+from shift_study.study import Study
 from shift_study.yaml_reader import read_yaml
 
 

@@ -14,7 +14,7 @@ from shift_model.vocabulary import TRIPLES, Triple
 from shift_schemas.messages import TripleView
 
 from shift_study.loading import study_from_json
-from shift_study.study import ScoringSettings
+from shift_study.scoring_table import ScoringSettings
 
 
 class Reduction(NamedTuple):

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from shift_study.study import LearnerSettings
+from shift_study.learner_settings import LearnerSettings
 
 from shift_learner.learners.planning.plausible import Bools, Floats, Ints, Plausible
 

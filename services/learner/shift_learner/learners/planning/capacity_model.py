@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 from shift_model.capacity import is_high, next_capacity, strategy_cost
-from shift_study.study import CapacitySettings, Study
+from shift_study.constants import CapacitySettings
+from shift_study.study import Study
 
 from shift_learner.learners.planning.plausible import Floats, Ints
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shift_model.scoring import level_index, scaffolding_score
 from shift_model.vocabulary import AWARENESSES, CAPACITIES, GAZES, TRIPLES
-from shift_study.study import ScoringSettings, StrategySettings
+from shift_study.scoring_table import ScoringSettings, StrategySettings
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
