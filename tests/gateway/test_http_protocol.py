@@ -53,7 +53,7 @@ CHUNKED = (
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 1000, 100_000])
-def test_an_offer_of_http2_is_ignored_and_the_body_is_read(port: int, size: int) -> None:
+def test_offer_of_http2_is_ignored_and_the_body_is_read(port: int, size: int) -> None:
     large = b"x" * 5000 if size > 7 else b"xy"
     whole = post(b"a", b'{"task": "grasp"}') + CHUNKED + post(b"b", large) + post(b"e", b"") + LAST
     pieces = [whole[i : i + size] for i in range(0, len(whole), size)]
@@ -62,19 +62,19 @@ def test_an_offer_of_http2_is_ignored_and_the_body_is_read(port: int, size: int)
     ]  # fmt: skip
 
 
-def test_the_body_may_come_long_after_the_headers(port: int) -> None:
+def test_body_may_come_long_after_the_headers(port: int) -> None:
     request = post(b"a", b"late")
     assert said(answers(port, [request[:-4], request[-4:-2], request[-2:], LAST])) == [("a", "late"), ("last", "")]
 
 
-def test_a_server_that_ignores_the_offer_still_answers_expect(port: int) -> None:
+def test_server_that_ignores_the_offer_still_answers_expect(port: int) -> None:
     request = post(b"a", b"asked", OFFER + b"Expect: 100-continue\r\n")
     raw = answers(port, [request[:-5], request[-5:], LAST])
     assert raw.startswith(b"HTTP/1.1 100 Continue\r\n")
     assert said(raw) == [("a", "asked"), ("last", "")]
 
 
-def test_other_offers_and_headers_beside_them_are_taken_the_same_way(port: int) -> None:
+def test_other_offers_and_further_headers_are_ignored_as_well(port: int) -> None:
     offer = b"Upgrade: TLS/1.0\r\nConnection: keep-alive, upgrade\r\nX-Mine: 1\r\n"
     raw = answers(port, [post(b"a", b"q", offer), LAST])
     assert said(raw) == [("a", "q"), ("last", "")]
@@ -87,7 +87,7 @@ def test_nonsense_after_an_offer_is_a_bad_request(port: int) -> None:
     assert raw.startswith(b"HTTP/1.1 400")
 
 
-def test_a_websocket_still_opens(port: int) -> None:
+def test_websocket_still_opens(port: int) -> None:
     with connect(f"ws://127.0.0.1:{port}/socket") as socket:
         socket.send("hello")
         assert socket.recv() == "hello"
