@@ -1,4 +1,4 @@
-"""Browsers at the door: hosts, origins, CORS, HEAD, OPTIONS, pages without another host."""
+"""Browsers as clients: hosts, origins, CORS, HEAD, OPTIONS, and pages without another host."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LAB, EVIL = "https://lab.example.org", "http://evil.example"
 
 @pytest.fixture
 async def lab(tmp_path: Path, anyio_backend: str) -> AsyncIterator[httpx.AsyncClient]:
-    """A gateway that pages of ``LAB`` may use; no service runs behind it."""
+    """Yield a client of a gateway that pages of ``LAB`` may use, without any other service."""
 
     async def open_bus() -> MemoryBus:
         return MemoryBus(Hub())
@@ -126,7 +126,7 @@ async def test_head_is_answered_as_get_without_a_body(mesh: Mesh) -> None:
 
 
 async def heads_are_gets_without_a_body(client: httpx.AsyncClient, recording: str) -> None:
-    """Compare HEAD and GET through the real server; a part of the recording too."""
+    """Compare HEAD and GET through the real server, also for a part of a recording."""
     for path in (*GETS[:6], "/healthz", recording):
         found, whole = await client.head(path), await client.get(path)
         assert (found.status_code, found.content) == (200, b"")

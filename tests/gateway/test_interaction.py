@@ -1,4 +1,4 @@
-"""Gaze, decisions, performance, overrides and reads through the REST door, field by field."""
+"""Gaze, decisions, performance, overrides and reads over REST, field by field."""
 
 from __future__ import annotations
 
@@ -255,7 +255,7 @@ async def test_chunk_numbers_are_checked(mesh: Mesh) -> None:
 
 
 async def test_restarted_tracker_loses_no_acknowledged_chunk(mesh: Mesh) -> None:
-    """Over REST and over the WebSocket: 200 chunks, again from number 0 with other content, and each of them twice."""
+    """Send 200 chunks over REST and WebSocket, then again from number 0 with other content, and each of them twice."""
     session = await mesh.session(STUDY)
 
     def chunk(seq: int, start_s: float, x: float) -> dict[str, Any]:
@@ -484,15 +484,15 @@ MODEL = {
     ("high", "distracted"): (UF, UF, DM, UF, DM),
     ("high", "focused"): (EO, EO, EM, EO, EM),
 }
-"""MODEL.md, section 2; uncertain is as distracted."""
+"""MODEL.md, section 2; uncertain counts as distracted."""
 RESULTS = {
     "failure": (False, False), "misconception_enabledness": (True, False), "misconception_comprehension": (False, True),
     "success": (True, True),
 }  # fmt: skip
 
 
-async def brought_about(session: Session, triple: Triple) -> None:
-    """Capacity by strategies, gaze by where one looks, awareness by results: all of it through the doors."""
+async def reach_state(session: Session, triple: Triple) -> None:
+    """Bring a session into a monitoring state by strategies, looks and results."""
     if triple.gaze == "focused":
         await session.look(["left"] * 6)
     elif triple.gaze == "distracted":
@@ -508,7 +508,7 @@ async def brought_about(session: Session, triple: Triple) -> None:
 @pytest.mark.parametrize("triple", TRIPLES, ids=lambda t: t.name)
 async def test_each_triple_gives_the_model_s_cognitive_state(mesh: Mesh, triple: Triple) -> None:
     session = await mesh.session()
-    await brought_about(session, triple)
+    await reach_state(session, triple)
     gaze = "distracted" if triple.gaze == "uncertain" else triple.gaze
     expected = MODEL[triple.capacity, gaze][["unknown", *RESULTS].index(triple.awareness)]
     for shown in (await session.read("strategy?task=grasp"), await session.decide()):

@@ -1,4 +1,4 @@
-"""Which hosts and origins the gateway answers, and what it says to the others."""
+"""The hosts and origins that the gateway answers, and its refusals of others."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HERE = "127.0.0.1:8080"
 
 
 def asked(method: str = "POST", host: str = HERE, *origins: str, **given: Any) -> RequestOrigin:
-    """A request."""
+    """Return the origin of a request."""
     return RequestOrigin(method, (host,), origins, **given)
 
 

@@ -1,4 +1,4 @@
-"""What goes wrong: problem documents, their order, hostile input, and services that are not there."""
+"""Refusals: problem documents, their order, hostile input, and missing services."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from support.gateway_mesh import NEGATED, STUDY, Mesh, performance, problem, unt
 
 pytestmark = pytest.mark.anyio
 LEFT_OUT = (("decisions", "decision_id"), ("override", "override_id"), ("markers", "marker_id"))
-"""Ids that a command can do without."""
+"""Ids that a command may leave out."""
 HOSTILE = ("**", "*", "a%2Fb", "..%2Fx", "%2e%2e", "a%00", "a%0A", "-a", "a.b", "ä", "%20", "a" * 64, "a" * 60_000)
 COMMANDS: dict[str, Any] = {
     "gaze": {"source": "a", "seq": 0, "t": [0.0], "aoi": ["left"]},
@@ -97,7 +97,7 @@ async def test_unknown_paths_and_methods_are_problems(mesh: Mesh) -> None:
 
 
 async def pieces(total: int, size: int = 10_000, head: bytes = b"") -> AsyncIterator[bytes]:
-    """A body of ``total`` bytes in pieces, without a length."""
+    """Yield a body of ``total`` bytes in pieces, without a length."""
     yield head
     for _ in range(total // size):
         yield b" " * size

@@ -1,4 +1,4 @@
-"""``/readyz`` is about pairs as well: every reader reaches every owner that it reads."""
+"""Readiness of services, and of the links between readers and owners."""
 
 from __future__ import annotations
 

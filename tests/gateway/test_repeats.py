@@ -1,4 +1,4 @@
-"""Commands that are sent again through the REST door: what a repeat gets, and what another content gets."""
+"""Repeated commands over REST: a repeat gets the first result, another content is refused."""
 
 from __future__ import annotations
 

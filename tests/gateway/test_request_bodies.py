@@ -1,4 +1,4 @@
-"""Each kind of body that clients send: taken, or refused with a sentence of its own."""
+"""Each kind of body that clients send: accepted, or refused with its own sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sessions, configuration and recordings through the REST door, field by field."""
+"""Sessions, configuration and recordings over REST, field by field."""
 
 from __future__ import annotations
 

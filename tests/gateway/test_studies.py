@@ -1,4 +1,4 @@
-"""``/v1/studies``: studies checked without a session, and starts that refuse what a check refuses."""
+"""``/v1/studies``: studies are checked without a session, and a start refuses what the check refuses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BOW_TIE = "study: bow\naois:\n  - {name: cup, polygon: [[0.2, 0.2], [0.8, 0.8], 
 
 @pytest.fixture
 def folder(mesh: Mesh) -> Iterator[Path]:
-    """The folder of studies, with one that is fine, one that is doubtful and one with a mistake."""
+    """Return a folder of studies: a valid one, a doubtful one, and one with a mistake."""
     folder = mesh.data / "studies"
     folder.mkdir(exist_ok=True)
     (folder / "own.yaml").write_text("study: own\ntitle: My own\nconditions: {on: {}, off: {}, 01: {}}\n")

@@ -1,4 +1,4 @@
-"""The mesh client: it sends again with the same id, and says who does not answer and what was refused."""
+"""The mesh client: it repeats a request with the same id, and names the service that does not answer or refuses."""
 
 from __future__ import annotations
 

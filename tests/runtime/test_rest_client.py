@@ -1,4 +1,4 @@
-"""The REST client, at a small HTTP server that says what it is told to."""
+"""The REST client, with a small HTTP server whose answers the tests set."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from shift_schemas.messages import Command, Configure, GazeChunk, Mark
 
 @dataclass
 class Gateway:
-    """Answers with what is in ``answers``, one after the other; the last one for ever."""
+    """Answers with the entries of ``answers`` in turn, and then always with the last one."""
 
     answers: list[tuple[int, Any]] = field(default_factory=lambda: [(200, {})])
     asked: list[tuple[str, str, Any]] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""Studies by name: the data folder's before the built-in ones, and a name is nothing but a name."""
+"""Studies by name: files of the data folder replace built-in studies, and a name is never a path."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from shift_study.study import Study
 
 
 def started(name: str, folder: Path) -> Study:
-    """The study that a start with this name would have."""
+    """Return the study that a start with this name would have."""
     return study_of(study_to_start(name, folder).data)
 
 
 def refusal(name: str, folder: Path) -> str:
-    """What is said of a start with this name."""
+    """Return the refusal of a start with this name."""
     with pytest.raises(InvalidStudy) as refused:
         study_to_start(name, folder)
     assert len(refused.value.detail) < 600

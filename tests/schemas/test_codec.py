@@ -1,4 +1,4 @@
-"""Payloads: what a peer may send is decoded or refused as malformed, never anything else."""
+"""Payloads: any payload is either decoded or refused as malformed."""
 
 import json
 

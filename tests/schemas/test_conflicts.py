@@ -1,4 +1,4 @@
-"""A command id that is used again with another content: the refusal says what differs and what to do."""
+"""A command id with another content: the refusal names the differences and the remedy."""
 
 from __future__ import annotations
 

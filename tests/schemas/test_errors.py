@@ -1,4 +1,4 @@
-"""Errors travel as problems and arrive as what they were."""
+"""Errors travel as problems and arrive as the same errors."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""One rule for ids, whoever checks it."""
+"""The rule for ids, and proposals for texts that break it."""
 
 import re
 
@@ -13,8 +13,8 @@ from support.message_strategies import HOSTILE_IDS, ids
 _FIELD = TypeAdapter(Id)
 
 
-def taken_by_a_field(text: object) -> bool:
-    """Whether a message's field takes ``text`` as an id."""
+def accepted_by_a_field(text: object) -> bool:
+    """Return whether a message's field accepts ``text`` as an id."""
     try:
         return _FIELD.validate_python(text) == text
     except ValidationError:
@@ -24,24 +24,24 @@ def taken_by_a_field(text: object) -> bool:
 @given(ids)
 def test_text_that_follows_the_rule_is_an_id(text: str) -> None:
     assert is_id(text)
-    assert taken_by_a_field(text)
+    assert accepted_by_a_field(text)
 
 
 @pytest.mark.parametrize("text", HOSTILE_IDS, ids=lambda t: ascii(t)[:20])
 def test_hostile_ids_are_refused(text: str) -> None:
     assert not is_id(text)
-    assert not taken_by_a_field(text)
+    assert not accepted_by_a_field(text)
 
 
 @given(st.text(max_size=70))
 def test_function_and_field_agree_on_any_text(text: str) -> None:
-    assert is_id(text) == taken_by_a_field(text) == bool(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}", text))
+    assert is_id(text) == accepted_by_a_field(text) == bool(re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,62}", text))
 
 
 @given(ids)
 def test_id_with_a_trailing_newline_is_refused(text: str) -> None:
     assert not is_id(text + "\n")
-    assert not taken_by_a_field(text + "\n")
+    assert not accepted_by_a_field(text + "\n")
 
 
 @pytest.mark.parametrize("value", [None, 1, b"a", ["a"], True])

@@ -1,4 +1,4 @@
-"""Keys: building and parsing are inverses, and nothing else parses."""
+"""Keys: building and parsing are inverses, and no other text parses."""
 
 import pytest
 from hypothesis import example, given

@@ -1,4 +1,4 @@
-"""JSON as a door takes it: without the liberties that Python takes."""
+"""Strict JSON: what only Python accepts is refused."""
 
 import json
 
