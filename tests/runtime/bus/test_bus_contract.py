@@ -79,6 +79,18 @@ async def test_two_stars_at_the_end_are_any_rest(open_bus: OpenBus) -> None:
     assert heard == ["a/1", "a/1/2/3"]
 
 
+async def test_star_matches_no_part_that_begins_with_an_at_sign(open_bus: OpenBus) -> None:
+    one, other = await pair(open_bus)
+    heard: list[str] = []
+    for key in ("a/**", "a/*/c", "a/@b/**", "end"):
+        other.subscribe(key, lambda m, key=key: heard.append(f"{key} {m.key}"))
+    await asyncio.sleep(0.1)
+    for key in ("a/@b/c", "end"):
+        one.put(key, b"")
+    await until(lambda: "end end" in heard)
+    assert heard == ["a/@b/** a/@b/c", "end end"]
+
+
 async def test_publications_of_one_bus_arrive_in_their_order(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[int] = []

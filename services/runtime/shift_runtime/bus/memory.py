@@ -14,11 +14,16 @@ T = TypeVar("T")
 
 
 def matches(expression: str, key: str) -> bool:
-    """Whether a key expression (``*`` is any one part, ``**`` at its end any rest) takes in ``key``."""
+    """Return whether a key expression matches ``key``, as in Zenoh.
+
+    ``*`` matches any one part and ``**`` at the end any rest, but neither matches a part that begins with ``@``.
+    """
     parts, wanted = key.split("/"), expression.split("/")
     if wanted[-1] == "**":
         wanted = wanted[:-1] + ["*"] * (len(parts) - len(wanted) + 1)
-    return len(parts) == len(wanted) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=True))
+    return len(parts) == len(wanted) and all(
+        w == p or (w == "*" and not p.startswith("@")) for w, p in zip(wanted, parts, strict=True)
+    )
 
 
 @dataclass
