@@ -14,7 +14,8 @@ import pytest
 import zenoh
 from prometheus_client.parser import text_string_to_metric_families
 from shift_runtime.bus.zenoh_config import zenoh_config
-from shift_schemas.keys import ENDPOINTS, PROCEDURE_OWNER, SUBJECTS
+from shift_schemas.keys import ENDPOINTS
+from shift_schemas.registry import PROCEDURE_OWNER, SUBJECTS
 from support.interactions import check_recording, essences, expected, interact
 from support.whole_mesh import LiveMesh
 

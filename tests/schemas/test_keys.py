@@ -6,13 +6,6 @@ from hypothesis import strategies as st
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import (
     ENDPOINTS,
-    OWNER_OF,
-    OWNERS,
-    PROCEDURE_OWNER,
-    READS,
-    SERVICES,
-    STREAMS,
-    SUBJECTS,
     CommandKey,
     FactKey,
     Key,
@@ -21,7 +14,12 @@ from shift_schemas.keys import (
     build_key,
     parse_key,
 )
-from shift_schemas.messages import COMMANDS, FACTS
+from shift_schemas.registry import (
+    PROCEDURE_OWNER,
+    SERVICES,
+    STREAMS,
+    SUBJECTS,
+)
 from support.message_strategies import HOSTILE_IDS, ids
 
 keys = (
@@ -80,22 +78,3 @@ def test_hostile_sessions_are_neither_built_nor_parsed(session: str) -> None:
 def test_unknown_words_make_no_key(key: Key) -> None:
     with pytest.raises(MalformedMessage):
         build_key(key)
-
-
-def test_each_fact_and_each_command_has_exactly_one_owner() -> None:
-    assert sorted(OWNER_OF) == sorted(SUBJECTS) == sorted(FACTS)
-    assert sum(map(len, OWNERS.values())) == len(SUBJECTS)
-    assert set(PROCEDURE_OWNER) == set(COMMANDS)
-
-
-def test_topics_are_in_the_contract_s_order() -> None:
-    assert SUBJECTS == tuple(FACTS) == (
-        "session", "config", "gaze", "fixation", "observation", "estimate", "decision", "override", "performance",
-        "transition", "policy", "marker",
-    )  # fmt: skip
-
-
-def test_whoever_steps_on_a_subject_reads_its_owner() -> None:
-    for reads in READS.values():
-        for owner, subjects in reads.items():
-            assert subjects <= set(OWNERS[owner])

@@ -19,8 +19,9 @@ from shift_runtime.service.loop import Worker
 from shift_runtime.settings import MeshSettings
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import Problem
-from shift_schemas.keys import READS, CommandKey, ServiceKey, build_key
+from shift_schemas.keys import CommandKey, ServiceKey, build_key
 from shift_schemas.messages import Answer, Command, EndSession, OutboxPage, OutboxQuery, StartSession
+from shift_schemas.registry import READS
 
 from support.runtime_fixtures import until
 from support.worker_rig import FullDisk

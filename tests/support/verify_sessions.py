@@ -28,7 +28,6 @@ from shift_recording.merging import finish_recording
 from shift_recording.provenance import attachments_of, metadata_of
 from shift_recording.segments import SegmentWriter
 from shift_schemas.core_protocol import InputsMissing
-from shift_schemas.keys import READS
 from shift_schemas.messages import (
     Command,
     Configure,
@@ -43,6 +42,7 @@ from shift_schemas.messages import (
     SetOverride,
     StartSession,
 )
+from shift_schemas.registry import READS
 from shift_schemas.timestamps import Stamp
 
 CORES: dict[str, Callable[..., Any]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shift_runtime.service.core import Core
-from shift_schemas.keys import READS
+from shift_schemas.registry import READS
 
 from shift_decider import core
 from shift_decider.core import DeciderState

@@ -1,12 +1,12 @@
-"""The monitor's shell: its core, the owners that it reads, and its gaze stream. The worker does the rest."""
+"""The monitor's shell: its core and the owners that it reads. The worker does the rest."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from shift_runtime.service.core import Core, Recall
-from shift_schemas.keys import READS
 from shift_schemas.messages import GazeChunk
+from shift_schemas.registry import READS
 
 from shift_monitor import core
 from shift_monitor.core import MonitorState
@@ -26,5 +26,4 @@ CORE: Core[MonitorState] = Core(
     reads=READS["monitor"],
     prepare=prepared,
     lookups={"gaze": ("source", "seq")},
-    streams={"gaze": GazeChunk},
 )

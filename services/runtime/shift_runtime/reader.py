@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 import structlog
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import MalformedMessage
-from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, build_key, parse_key
-from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxRow, Session
+from shift_schemas.keys import ROOT, FactKey, ServiceKey, build_key, parse_key
+from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, OutboxRow, Session
+from shift_schemas.registry import FACTS, OWNER_OF, OWNERS
 
 from shift_runtime.bus.protocol import Bus, Incoming, Reply, first_answer
 from shift_runtime.links import Links
@@ -27,7 +28,7 @@ PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
 FIRST_WAIT_S, FIRST_PAUSE_S = 1.0, 0.05
 """How long the session owner is asked at the start before the others are read without it; chosen: a short start."""
-SESSION_OWNER = OWNER_OF[Session.subject]
+SESSION_OWNER = Session.owner
 """The owner whose facts say that a session exists."""
 REPLAY_MARK = b"replay:"
 """Before the sequence of what is replayed: tools that listen hear it, a reader passes over it."""

@@ -21,9 +21,9 @@ from shift_recording.mcap.reader import RecordedMessage, Recording, fact_of
 from shift_recording.mcap.writer import CONFIG_METADATA
 from shift_recording.provenance import STUDY
 from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, shorten
-from shift_schemas.keys import OWNER_OF, OWNERS, SUBJECTS
 from shift_schemas.lifecycle import has_ended, is_ending
 from shift_schemas.messages import Config, Fact, Observation, Session
+from shift_schemas.registry import OWNER_OF, OWNERS, SUBJECTS
 
 from shift_verify.decider import Redecide
 from shift_verify.difference import Difference, Differs, NotRecorded, Placed, differ, name_of

@@ -10,8 +10,8 @@ import pytest
 from shift_recorder.service import convergence as module
 from shift_recorder.service.convergence import Convergence
 from shift_schemas.errors import Conflict, Unavailable
-from shift_schemas.keys import OWNERS, READS
 from shift_schemas.messages import OutboxPage
+from shift_schemas.registry import OWNERS, READS
 
 pytestmark = pytest.mark.anyio
 HEADS = {"recorder": 3, "monitor": 20, "decider": 7, "learner": 5}

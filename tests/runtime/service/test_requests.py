@@ -43,7 +43,7 @@ class Desk:
         hub = Hub()
         self.client, self.answers, self.metrics = MemoryBus(hub), Answers(), Metrics(self.service)
         self.requests = Requests(
-            self.service, {"gaze": GazeChunk}, MemoryBus(hub), self.answers, self.metrics,
+            self.service, MemoryBus(hub), self.answers, self.metrics,
             lambda request: self.joined, self.delivered.append,
         )  # fmt: skip
         self.requests.declare()

@@ -14,7 +14,7 @@ from shift_runtime.service.core import Core
 from shift_runtime.service.extension import Extension
 from shift_runtime.service.loop import Worker
 from shift_runtime.settings import MeshSettings
-from shift_schemas.keys import READS
+from shift_schemas.registry import READS
 
 from shift_recorder import core
 from shift_recorder.core import RecorderState

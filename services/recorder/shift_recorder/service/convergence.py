@@ -8,8 +8,8 @@ from shift_runtime.polling import poll
 from shift_runtime.reader import SESSION_OWNER, Reader
 from shift_runtime.service.progress import Progress
 from shift_schemas.errors import Conflict, Unavailable
-from shift_schemas.keys import OWNERS, READS
 from shift_schemas.messages import OutboxPage
+from shift_schemas.registry import OWNERS, READS
 
 END_WAIT_S = 3.5
 """How long an end waits for the other services; shorter than the gateway waits, so that the client is told why."""

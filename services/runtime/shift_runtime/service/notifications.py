@@ -6,7 +6,8 @@ import asyncio
 
 from shift_schemas.codec import encoding_of
 from shift_schemas.keys import FactKey, build_key
-from shift_schemas.messages import FACTS, OutboxRow
+from shift_schemas.messages import OutboxRow
+from shift_schemas.registry import FACTS
 
 from shift_runtime.bus.protocol import Bus
 from shift_runtime.metrics import Metrics

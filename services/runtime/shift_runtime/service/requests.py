@@ -10,8 +10,9 @@ from typing import Protocol
 from shift_schemas.codec import decode, encode
 from shift_schemas.conflicts import repeat_conflict
 from shift_schemas.errors import MalformedMessage, Problem, ShiftError
-from shift_schemas.keys import PROCEDURES, ROOT, STREAMS, CommandKey, StreamKey, parse_key
-from shift_schemas.messages import COMMANDS, Command, Message
+from shift_schemas.keys import ROOT, CommandKey, StreamKey, parse_key
+from shift_schemas.messages import Command, Message, StreamItem
+from shift_schemas.registry import COMMANDS, STREAM_ITEMS
 
 from shift_runtime.bus.protocol import Bus, Incoming, Request
 from shift_runtime.journal import AnswerKey, StoredAnswer, same_content
@@ -69,8 +70,6 @@ class Requests:
 
     Parameters
     ----------
-    streams
-        By stream that the service owns, the message that its payloads are decoded as.
     join
         Adds a command to an equal one that is parked; returns whether there was one.
     """
@@ -78,7 +77,6 @@ class Requests:
     def __init__(
         self,
         service: str,
-        streams: Mapping[str, type[Message]],
         bus: Bus,
         answers: StoredAnswers,
         metrics: Metrics,
@@ -86,7 +84,6 @@ class Requests:
         deliver: Callable[[PendingRequest], None],
     ) -> None:
         self._service = service
-        self._streams = streams
         self._bus = bus
         self._answers = answers
         self._metrics = metrics
@@ -95,11 +92,11 @@ class Requests:
 
     def declare(self) -> None:
         """Receive the commands and the streams that the service owns."""
-        for procedure in PROCEDURES.get(self._service, ()):
-            self._bus.serve(f"{ROOT}/*/rpc/{procedure}", self._on_command)
-        for stream, owner in STREAMS.items():
-            if owner == self._service:
-                kind = self._streams[stream]
+        for procedure, command in COMMANDS.items():
+            if command.owner == self._service:
+                self._bus.serve(f"{ROOT}/*/rpc/{procedure}", self._on_command)
+        for stream, kind in STREAM_ITEMS.items():
+            if kind.owner == self._service:
                 key = f"{ROOT}/*/in/{stream}"
                 self._bus.serve(key, partial(self._on_stream_request, kind), limit=STREAM_LIMIT)
                 self._bus.subscribe(key, partial(self._on_stream, kind), limit=STREAM_LIMIT)
@@ -137,7 +134,7 @@ class Requests:
         if not self._join(pending):
             self._deliver(pending)
 
-    def _on_stream_request(self, kind: type[Message], request: Request) -> None:
+    def _on_stream_request(self, kind: type[StreamItem], request: Request) -> None:
         try:
             pending = _chunk(kind, request.key, request.payload)
         except MalformedMessage as e:
@@ -146,7 +143,7 @@ class Requests:
         pending.requests.append(request)
         self._deliver(pending)
 
-    def _on_stream(self, kind: type[Message], incoming: Incoming) -> None:
+    def _on_stream(self, kind: type[StreamItem], incoming: Incoming) -> None:
         try:
             pending = _chunk(kind, incoming.key, incoming.payload)
         except MalformedMessage:
@@ -159,7 +156,7 @@ class Requests:
         request.refuse(encode(Problem.of(error)))
 
 
-def _chunk(kind: type[Message], text: str, payload: bytes) -> PendingRequest:
+def _chunk(kind: type[StreamItem], text: str, payload: bytes) -> PendingRequest:
     key = parse_key(text)
     if not isinstance(key, StreamKey):
         raise MalformedMessage(f"{text} is not the key of a stream")

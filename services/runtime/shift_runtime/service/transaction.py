@@ -12,7 +12,8 @@ import structlog
 from shift_schemas.codec import decode
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import ShiftError, Unavailable
-from shift_schemas.messages import FACTS, Command, Fact, OutboxRow
+from shift_schemas.messages import Command, Fact, OutboxRow
+from shift_schemas.registry import FACTS
 
 from shift_runtime.journal import Batch, Journal, StoredAnswer
 from shift_runtime.metrics import Metrics
