@@ -97,7 +97,7 @@ def run(work: Coroutine[Any, Any, None]) -> None:
 # --- hints ---
 
 
-def test_hints_in_their_order_are_delivered_without_a_single_pull() -> None:
+def test_notifications_in_order_are_delivered_without_a_pull() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(3)
@@ -112,7 +112,7 @@ def test_hints_in_their_order_are_delivered_without_a_single_pull() -> None:
     run(test())
 
 
-def test_a_gap_is_pulled_at_once() -> None:
+def test_gap_is_pulled_at_once() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(8)
@@ -124,7 +124,7 @@ def test_a_gap_is_pulled_at_once() -> None:
     run(test())
 
 
-def test_what_was_read_is_not_delivered_again() -> None:
+def test_delivered_fact_is_not_delivered_again() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
@@ -137,7 +137,7 @@ def test_what_was_read_is_not_delivered_again() -> None:
     run(test())
 
 
-def test_without_any_hint_a_pull_reads_page_by_page_to_the_end() -> None:
+def test_pull_without_notifications_reads_page_by_page_to_the_end() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(7)
@@ -150,7 +150,7 @@ def test_without_any_hint_a_pull_reads_page_by_page_to_the_end() -> None:
     run(test())
 
 
-def test_it_goes_on_where_its_cursor_says() -> None:
+def test_reader_continues_at_its_cursor() -> None:
     async def test() -> None:
         bus = MemoryBus(Hub())
         owner = Owner(bus).live()
@@ -179,7 +179,7 @@ def test_it_goes_on_where_its_cursor_says() -> None:
         ("shift/v1/-x/marker", marker(1).model_dump_json().encode(), b"1"),
     ],
 )
-def test_a_hint_that_is_no_fact_is_counted_and_dropped(key: str, payload: bytes, attachment: bytes) -> None:
+def test_invalid_notification_is_counted_and_dropped(key: str, payload: bytes, attachment: bytes) -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(1)
@@ -194,7 +194,7 @@ def test_a_hint_that_is_no_fact_is_counted_and_dropped(key: str, payload: bytes,
     run(test())
 
 
-def test_a_sequence_of_0_is_never_the_next_one() -> None:
+def test_sequence_0_is_never_next() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.bus.put("shift/v1/s1/marker", marker(1).model_dump_json().encode(), attachment=b"0")
@@ -204,7 +204,7 @@ def test_a_sequence_of_0_is_never_the_next_one() -> None:
     run(test())
 
 
-def test_a_forgotten_session_is_read_no_more() -> None:
+def test_forgotten_session_is_not_read_any_more() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
@@ -222,7 +222,7 @@ def test_a_forgotten_session_is_read_no_more() -> None:
 # --- pulls ---
 
 
-def test_an_owner_that_is_not_there_is_no_answer_and_nothing_is_lost() -> None:
+def test_absent_owner_gives_no_answer_and_nothing_is_lost() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
@@ -237,7 +237,7 @@ def test_an_owner_that_is_not_there_is_no_answer_and_nothing_is_lost() -> None:
     run(test())
 
 
-def test_nobody_counts_as_read_before_the_recorder_since_no_session_is_known_before() -> None:
+def test_no_owner_is_synced_before_the_recorder() -> None:
     """Facts of a session that nobody told of are held back: an owner read that early is not read."""
 
     async def test() -> None:
@@ -256,7 +256,7 @@ def test_nobody_counts_as_read_before_the_recorder_since_no_session_is_known_bef
     run(test())
 
 
-def test_what_is_asked_for_during_a_pull_gets_one_more_after_it() -> None:
+def test_request_during_a_pull_causes_one_more_pull() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(1)
@@ -271,7 +271,7 @@ def test_what_is_asked_for_during_a_pull_gets_one_more_after_it() -> None:
     run(test())
 
 
-def test_a_session_by_name_is_read_alone_and_its_page_kept() -> None:
+def test_named_session_is_read_alone_and_its_page_is_kept() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
@@ -286,7 +286,7 @@ def test_a_session_by_name_is_read_alone_and_its_page_kept() -> None:
 
 
 @pytest.mark.parametrize("page", [b"", b"{}", b"\xff", b"[" * 10_000, encode(marker(1))])
-def test_a_page_that_is_none_is_counted_and_another_answer_taken(page: bytes) -> None:
+def test_invalid_page_is_counted_and_another_answer_is_used(page: bytes) -> None:
     async def test() -> None:
         bus = MemoryBus(Hub())
         bus.serve(OUTBOX, lambda r: r.reply(page))
@@ -301,7 +301,7 @@ def test_a_page_that_is_none_is_counted_and_another_answer_taken(page: bytes) ->
     run(test())
 
 
-def test_a_row_that_is_no_fact_stops_the_reading_and_is_counted() -> None:
+def test_invalid_row_stops_the_pull_and_is_counted() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(3)
@@ -316,12 +316,12 @@ def test_a_row_that_is_no_fact_stops_the_reading_and_is_counted() -> None:
 @pytest.mark.parametrize(
     "bad", [row(1).model_copy(update={"subject": "nonsense"}), row(1, "s2").model_copy(update={"session": "s1"})]
 )
-def test_a_row_of_no_subject_or_of_another_session_is_malformed(bad: OutboxRow) -> None:
+def test_row_of_an_unknown_subject_or_another_session_is_malformed(bad: OutboxRow) -> None:
     with pytest.raises(MalformedMessage):
         fact_of(bad)
 
 
-def test_a_pull_that_gets_nowhere_ends_instead_of_asking_without_pause() -> None:
+def test_pull_without_progress_ends() -> None:
     async def test() -> None:
         """Facts of a session that cannot be taken yet (the gateway's replica, before the recorder answers)."""
         bus = MemoryBus(Hub())
@@ -339,7 +339,7 @@ def test_a_pull_that_gets_nowhere_ends_instead_of_asking_without_pause() -> None
     run(test())
 
 
-def test_rows_of_a_session_that_is_done_do_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_of_finished_sessions_do_not_hide_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """An owner that has not closed the session yet offers all of it again: it must not fill every page."""
 
     async def test() -> None:
@@ -358,7 +358,7 @@ def test_rows_of_a_session_that_is_done_do_not_hide_the_others(monkeypatch: pyte
     run(test())
 
 
-def test_it_pulls_of_its_own_accord_from_time_to_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reader_pulls_periodically(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reader_module, "PULL_EVERY_S", 0.01)
 
     async def test() -> None:
@@ -395,7 +395,7 @@ EVENT = st.one_of(
     events=st.lists(st.tuples(st.sampled_from(["s1", "s2"]), EVENT), max_size=40),
     most=st.integers(1, 5),
 )
-def test_any_interleaving_delivers_1_to_n_in_order_once(events: list[Any], most: int) -> None:
+def test_any_interleaving_delivers_1_to_n_once_in_order(events: list[Any], most: int) -> None:
     """Hints lost, doubled, late or malformed, pulls in between, the owner or the reader restarted at any point."""
 
     async def test() -> None:
@@ -469,5 +469,5 @@ async def older_journal_is_named() -> None:
     assert "ends at message 0" in next(iter(reader.misfits.values()))
 
 
-def test_a_journal_that_is_older_than_what_was_read_of_it_is_named() -> None:
+def test_journal_older_than_its_reader_is_reported() -> None:
     asyncio.run(older_journal_is_named())

@@ -53,7 +53,7 @@ class Hanging(threading.Thread):
 
 
 @pytest.mark.anyio
-async def test_a_hung_handler_silences_its_health_and_its_outbox_though_the_token_stays(
+async def test_hung_worker_answers_neither_health_nor_outbox_though_its_token_stays(
     router: str, tmp_path: Path
 ) -> None:
     hanging = Hanging(router, tmp_path / "decider.sqlite")

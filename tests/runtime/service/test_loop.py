@@ -40,7 +40,7 @@ async def live(tmp_path: Path) -> Any:
 
 
 @RUNNING
-async def test_a_command_is_committed_published_and_answered_with_its_sequence(live: Rig) -> None:
+async def test_command_is_committed_published_and_answered_with_its_sequence(live: Rig) -> None:
     answer = await live.decide("d1")
     assert answer.owner == "decider"
     assert answer.seq == 1
@@ -52,7 +52,7 @@ async def test_a_command_is_committed_published_and_answered_with_its_sequence(l
 
 
 @RUNNING
-async def test_a_repeat_gets_the_first_result_and_changes_nothing(live: Rig) -> None:
+async def test_repeat_gets_the_first_result_and_changes_nothing(live: Rig) -> None:
     first = await live.decide("d1")
     await live.decide("d2")
     repeat = await live.decide("d1")
@@ -62,7 +62,7 @@ async def test_a_repeat_gets_the_first_result_and_changes_nothing(live: Rig) -> 
 
 
 @RUNNING
-async def test_an_answer_that_is_a_fact_is_repeated_as_it_was_after_a_crash(live: Rig) -> None:
+async def test_answer_that_is_a_fact_is_repeated_unchanged_after_a_crash(live: Rig) -> None:
     await live.decide("d1")
     first = await live.decide("d2", "fact")
     assert first.result["reason"] == "decision d2"
@@ -74,7 +74,7 @@ async def test_an_answer_that_is_a_fact_is_repeated_as_it_was_after_a_crash(live
 
 
 @RUNNING
-async def test_a_repeat_gets_the_first_result_after_a_crash(live: Rig) -> None:
+async def test_repeat_gets_the_first_result_after_a_crash(live: Rig) -> None:
     first = await live.decide("d1")
     await live.crash()
     live.start()
@@ -85,13 +85,13 @@ async def test_a_repeat_gets_the_first_result_after_a_crash(live: Rig) -> None:
 
 
 @RUNNING
-async def test_what_the_door_had_seen_is_no_part_of_a_command_s_content(live: Rig) -> None:
+async def test_required_inputs_are_not_part_of_a_command_s_content(live: Rig) -> None:
     await live.decide("d1")
     assert (await live.decide("d1", need=Seen(decision=7))).repeat
 
 
 @RUNNING
-async def test_the_same_id_with_another_content_is_a_conflict_now_and_after_a_crash(live: Rig) -> None:
+async def test_same_id_with_another_content_is_a_conflict_before_and_after_a_crash(live: Rig) -> None:
     await live.decide("d1", "one")
     for _ in range(2):
         with pytest.raises(Conflict, match="decision d1 was made before, with task one; this request says task other"):
@@ -102,7 +102,7 @@ async def test_the_same_id_with_another_content_is_a_conflict_now_and_after_a_cr
 
 
 @RUNNING
-async def test_the_same_command_many_times_at_once_is_carried_out_once(live: Rig) -> None:
+async def test_same_command_many_times_at_once_is_carried_out_once(live: Rig) -> None:
     answers = await asyncio.gather(*(live.decide("d1") for _ in range(20)), live.decide("d2"))
     assert [a.repeat for a in answers[:20]] == [False] + [True] * 19
     assert len({json.dumps(a.result) for a in answers[:20]}) == 1
@@ -110,14 +110,14 @@ async def test_the_same_command_many_times_at_once_is_carried_out_once(live: Rig
 
 
 @RUNNING
-async def test_in_one_turn_the_same_id_with_another_content_is_a_conflict(live: Rig) -> None:
+async def test_same_id_with_another_content_in_one_turn_is_a_conflict(live: Rig) -> None:
     first, second = await asyncio.gather(live.decide("d1", "one"), live.decide("d1", "other"), return_exceptions=True)
     assert not isinstance(first, BaseException)
     assert isinstance(second, Conflict)
 
 
 @RUNNING
-async def test_a_command_that_breaks_the_core_is_refused_and_the_service_lives_on(live: Rig) -> None:
+async def test_command_that_raises_in_the_core_is_refused_and_the_service_continues(live: Rig) -> None:
     with pytest.raises(ShiftError, match=r"because of a mistake of its own \(ZeroDivisionError\)") as found:
         await live.decide("d1", "breaks")
     assert found.value.kind == "internal"
@@ -128,7 +128,7 @@ async def test_a_command_that_breaks_the_core_is_refused_and_the_service_lives_o
 
 
 @RUNNING
-async def test_a_command_waits_for_the_facts_that_it_needs(live: Rig) -> None:
+async def test_command_waits_for_the_facts_that_it_requires(live: Rig) -> None:
     asked = asyncio.create_task(live.decide("d1", "after-2"))
     live.monitor.put_out(fixation(1), fixation(2))
     answer = await asked
@@ -136,14 +136,14 @@ async def test_a_command_waits_for_the_facts_that_it_needs(live: Rig) -> None:
 
 
 @RUNNING
-async def test_without_a_hint_it_asks_the_owner_again_while_it_waits(live: Rig) -> None:
+async def test_waiting_command_pulls_the_owner_without_a_notification(live: Rig) -> None:
     asked = asyncio.create_task(live.decide("d1", "after-2"))
     live.monitor.put_out(fixation(1), fixation(2), hint=False)
     assert (await asked).result["timed_out"] is False
 
 
 @RUNNING
-async def test_it_gives_up_in_time_and_says_that_it_is_late(live: Rig) -> None:
+async def test_command_times_out_and_is_answered_with_the_inputs_so_far(live: Rig) -> None:
     live.monitor.put_out(fixation(1))
     answer = await live.decide("d1", "after-2")
     assert answer.result == {"n": 2, "fixations": 1, "timed_out": True}
@@ -153,7 +153,7 @@ async def test_it_gives_up_in_time_and_says_that_it_is_late(live: Rig) -> None:
 
 
 @RUNNING
-async def test_repeats_that_come_meanwhile_wait_along_and_get_the_one_answer(live: Rig) -> None:
+async def test_repeats_of_a_waiting_command_get_its_one_answer(live: Rig) -> None:
     asked = [asyncio.create_task(live.decide("d1", "after-1")) for _ in range(5)]
     asked += [asyncio.create_task(live.decide("d1", "after-1", Seen(decision=1)))]
     await asyncio.sleep(0.02)
@@ -164,7 +164,7 @@ async def test_repeats_that_come_meanwhile_wait_along_and_get_the_one_answer(liv
 
 
 @RUNNING
-async def test_one_session_s_waiting_holds_up_no_other(live: Rig) -> None:
+async def test_waiting_session_does_not_delay_another(live: Rig) -> None:
     live.recorder.put_out(session("s2"), config("s2"))
     waiting = asyncio.create_task(live.decide("d1", "after-1"))
     await asyncio.sleep(0)
@@ -177,13 +177,13 @@ async def test_one_session_s_waiting_holds_up_no_other(live: Rig) -> None:
 
 
 @RUNNING
-async def test_before_a_session_is_called_unknown_the_recorder_is_asked_again(live: Rig) -> None:
+async def test_recorder_is_asked_again_before_a_session_is_called_unknown(live: Rig) -> None:
     live.recorder.put_out(session("s2"), config("s2"), hint=False)
     assert (await live.decide("d1", name="s2")).result["n"] == 1
 
 
 @RUNNING
-async def test_what_the_owners_do_not_know_is_unknown(live: Rig) -> None:
+async def test_thing_that_no_owner_knows_is_unknown(live: Rig) -> None:
     with pytest.raises(UnknownThing):
         await live.decide("d1", name="nobody")
     with pytest.raises(UnknownThing, match="there is no task unknown"):
@@ -193,7 +193,7 @@ async def test_what_the_owners_do_not_know_is_unknown(live: Rig) -> None:
 
 
 @RUNNING
-async def test_without_the_recorder_nobody_knows(live: Rig) -> None:
+async def test_unknown_session_is_unavailable_without_the_recorder(live: Rig) -> None:
     live.recorder.die()
     with pytest.raises(Unavailable, match="cannot know yet: the recorder does not answer"):
         await live.decide("d1", name="nobody")
@@ -203,7 +203,7 @@ async def test_without_the_recorder_nobody_knows(live: Rig) -> None:
 
 
 @RUNNING
-async def test_facts_that_come_before_their_session_are_held_back_and_applied_in_their_order(live: Rig) -> None:
+async def test_facts_before_their_session_are_deferred_and_applied_in_order(live: Rig) -> None:
     live.monitor.put_out(*(fixation(n, "s2") for n in (1, 2, 3)))
     await asyncio.sleep(0.05)
     assert live.outbox("s2") == []
@@ -215,7 +215,7 @@ async def test_facts_that_come_before_their_session_are_held_back_and_applied_in
 
 
 @RUNNING
-async def test_facts_that_come_before_the_configuration_are_held_back_too(live: Rig) -> None:
+async def test_facts_before_the_configuration_are_deferred(live: Rig) -> None:
     live.recorder.put_out(session("s2"))
     live.monitor.put_out(fixation(1, "s2"), fixation(2, "s2"))
     await asyncio.sleep(0.05)
@@ -226,7 +226,7 @@ async def test_facts_that_come_before_the_configuration_are_held_back_too(live: 
 
 
 @RUNNING
-async def test_a_stranger_s_fact_of_a_session_to_come_takes_no_place_in_it(live: Rig) -> None:
+async def test_forged_fact_of_a_future_session_takes_no_place_in_it(live: Rig) -> None:
     """Well-formed, and of a subject that this service only passes over: sequence 1 is still to come."""
     forged = Marker(session="s2", stamp=Stamp.of(1), marker_id="m", text="")
     gaze = Gaze(session="s2", stamp=Stamp.of(1), source="eyes", seq=0, t=[0.0], aoi=[""])
@@ -240,7 +240,7 @@ async def test_a_stranger_s_fact_of_a_session_to_come_takes_no_place_in_it(live:
 
 
 @RUNNING
-async def test_a_worker_that_was_away_reads_what_it_missed_once(live: Rig) -> None:
+async def test_restarted_worker_reads_what_it_missed_once(live: Rig) -> None:
     live.monitor.put_out(fixation(1))
     await until(lambda: len(live.outbox()) == 1)
     await live.crash()
@@ -260,7 +260,7 @@ async def test_facts_are_published_in_the_order_of_their_sequence(live: Rig) -> 
 
 
 @RUNNING
-async def test_a_session_that_ended_is_closed_and_read_no_more(live: Rig) -> None:
+async def test_ended_session_is_closed_and_not_read_any_more(live: Rig) -> None:
     await live.decide("d1")
     live.recorder.put_out(session(state="ending"), session(state="ended"))
     await until(lambda: live.journal.closed("s1"))
@@ -292,7 +292,7 @@ async def read_configuration(rig: Rig, version: int) -> None:
 
 @RUNNING
 @pytest.mark.usefixtures("patient")
-async def test_what_puts_nothing_out_is_committed_with_the_next_that_does(live: Rig) -> None:
+async def test_input_without_visible_effect_is_committed_with_the_next_visible_one(live: Rig) -> None:
     await live.decide("d1")
     before = live.journal.commits
     for version in (2, 3, 4):
@@ -306,7 +306,7 @@ async def test_what_puts_nothing_out_is_committed_with_the_next_that_does(live: 
 
 
 @RUNNING
-async def test_what_puts_nothing_out_is_committed_soon_and_only_once(
+async def test_input_without_visible_effect_is_committed_soon_and_once(
     live: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await live.decide("d1")
@@ -320,7 +320,7 @@ async def test_what_puts_nothing_out_is_committed_soon_and_only_once(
 
 @RUNNING
 @pytest.mark.usefixtures("patient")
-async def test_what_was_read_and_not_committed_is_read_again_after_a_crash(live: Rig) -> None:
+async def test_uncommitted_input_is_read_again_after_a_crash(live: Rig) -> None:
     await live.decide("d1")
     await read_configuration(live, 2)
     await live.crash()
@@ -333,7 +333,7 @@ async def test_what_was_read_and_not_committed_is_read_again_after_a_crash(live:
 
 @RUNNING
 @pytest.mark.usefixtures("patient")
-async def test_a_refused_commit_takes_back_what_waited_for_it_as_well(live: Rig) -> None:
+async def test_refused_commit_undoes_deferred_input_as_well(live: Rig) -> None:
     await live.decide("d1")
     await read_configuration(live, 2)
     live.journal.full = True
@@ -347,7 +347,7 @@ async def test_a_refused_commit_takes_back_what_waited_for_it_as_well(live: Rig)
 
 
 @RUNNING
-async def test_a_repeat_s_answer_needs_no_commit(live: Rig) -> None:
+async def test_repeat_needs_no_commit(live: Rig) -> None:
     await live.decide("d1")
     before = live.journal.commits
     assert (await live.decide("d1")).repeat
@@ -358,7 +358,7 @@ async def test_a_repeat_s_answer_needs_no_commit(live: Rig) -> None:
 
 
 @RUNNING
-async def test_a_refused_commit_undoes_its_turn_and_the_repeat_is_carried_out_once(live: Rig) -> None:
+async def test_refused_commit_is_undone_and_the_repeat_is_carried_out_once(live: Rig) -> None:
     await live.decide("d1")
     await until(lambda: live.published)  # its hint, which comes a little after the answer
     live.journal.full = True
@@ -395,9 +395,7 @@ async def test_facts_of_a_refused_commit_are_read_again_once_there_is_room(
 
 
 @RUNNING
-async def test_health_says_that_the_disk_refuses_and_recovers_without_being_asked_for_anything(
-    live: Rig, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_health_reports_a_full_disk_and_recovers_by_itself(live: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(disk_alarm_module, "CHECK_EVERY_S", 0.02)
     live.journal.full = True
     with pytest.raises(Unavailable):
@@ -416,7 +414,7 @@ async def test_health_says_that_the_disk_refuses_and_recovers_without_being_aske
 
 
 @RUNNING
-async def test_health_names_those_whose_journals_were_not_read_yet(tmp_path: Path) -> None:
+async def test_health_names_owners_whose_journals_were_not_read_yet(tmp_path: Path) -> None:
     rig = Rig(tmp_path / "decider.sqlite")
     rig.recorder.die()
     rig.monitor.die()
@@ -451,7 +449,7 @@ BAD = {
 
 @RUNNING
 @pytest.mark.parametrize("payload", BAD.values(), ids=BAD)
-async def test_a_malformed_command_is_counted_refused_and_dropped(live: Rig, payload: bytes) -> None:
+async def test_malformed_command_is_counted_and_refused(live: Rig, payload: bytes) -> None:
     (reply,) = await live.ask("shift/v1/s1/rpc/decide", payload)
     assert not reply.ok
     assert json.loads(reply.payload)["kind"] == "malformed"
@@ -463,7 +461,7 @@ async def test_a_malformed_command_is_counted_refused_and_dropped(live: Rig, pay
 
 @RUNNING
 @pytest.mark.parametrize("key", ["shift/v1/*/rpc/decide", "shift/v1/-x/rpc/decide", "shift/v1/a b/rpc/decide"])
-async def test_a_command_under_a_key_that_is_none_is_counted_and_refused(live: Rig, key: str) -> None:
+async def test_command_under_an_invalid_key_is_counted_and_refused(live: Rig, key: str) -> None:
     (reply,) = await live.ask(key, encode(GOOD))
     assert not reply.ok
     assert await live.dropped("malformed") == 1
@@ -471,14 +469,14 @@ async def test_a_command_under_a_key_that_is_none_is_counted_and_refused(live: R
 
 @RUNNING
 @pytest.mark.parametrize("payload", [b"", b"{]", b'{"limit": 0}', b'{"cursors": {"*": 1}}', b'{"limit": true}'])
-async def test_a_malformed_question_for_the_outbox_is_counted_and_refused(live: Rig, payload: bytes) -> None:
+async def test_malformed_outbox_query_is_counted_and_refused(live: Rig, payload: bytes) -> None:
     (reply,) = await live.ask("shift/v1/@service/decider/outbox", payload)
     assert not reply.ok
     assert await live.dropped("malformed") == 1
 
 
 @RUNNING
-async def test_a_malformed_fact_is_counted_and_dropped(live: Rig) -> None:
+async def test_malformed_fact_is_counted_and_dropped(live: Rig) -> None:
     live.bus.put("shift/v1/s1/fixation", b"{}", attachment=b"1")
     live.bus.put("shift/v1/s1/fixation", fixation(1).model_dump_json().encode())
     live.monitor.put_out(fixation(1))
@@ -488,7 +486,7 @@ async def test_a_malformed_fact_is_counted_and_dropped(live: Rig) -> None:
 
 
 @RUNNING
-async def test_the_outbox_tells_what_was_committed(live: Rig) -> None:
+async def test_outbox_holds_what_was_committed(live: Rig) -> None:
     live.monitor.put_out(fixation(1))
     await until(lambda: live.outbox())
     (reply,) = await live.ask("shift/v1/@service/decider/outbox", encode(OutboxQuery(only=["s1"])))
@@ -499,7 +497,7 @@ async def test_the_outbox_tells_what_was_committed(live: Rig) -> None:
 
 
 @RUNNING
-async def test_stop_ends_the_run_and_a_stopped_worker_left_everything_committed(live: Rig) -> None:
+async def test_stopped_worker_has_committed_everything(live: Rig) -> None:
     await live.decide("d1")
     await live.stop()
     assert live.running.done()
@@ -507,7 +505,7 @@ async def test_stop_ends_the_run_and_a_stopped_worker_left_everything_committed(
     assert (await live.decide("d2")).result["n"] == 2
 
 
-def test_the_small_core_is_loaded_as_it_was_dumped() -> None:
+def test_small_core_is_loaded_as_it_was_dumped() -> None:
     state = Notes("s1", 1, ("a", "b"))
     assert load(dump(state)) == state
     assert CORE.name == "decider"
