@@ -6,7 +6,7 @@ from shift_monitor.service import CORE
 
 
 def main() -> None:
-    """Run it."""
+    """Run the monitor."""
     run_service(CORE)
 
 
