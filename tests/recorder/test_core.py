@@ -1,4 +1,4 @@
-"""The recorder's core: the session's start, end, configuration and markers, as a fold."""
+"""The recorder's core: start, end, configuration and markers of a session."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ STUDY: dict[str, Any] = {"study": "mine", "conditions": {"control": {"learner": 
 
 
 def start(**given: Any) -> StartSession:
-    """A start, its study resolved as the shell does it."""
+    """Return a start whose study was found, as by the shell."""
     return StartSession(**{"command_id": "start", "session": "s1", "participant": "P01", "study": STUDY, **given})
 
 
 def begun(**given: Any) -> RecorderState:
-    """A session that has begun."""
+    """Return the state of a session that has started."""
     return core.step(None, start(**given), NOW).state
 
 
 def configure(state: RecorderState, patch: dict[str, Any]) -> Step[RecorderState]:
-    """One change."""
+    """Return the result of one change."""
     return core.step(state, Configure(command_id="c1", session="s1", patch=patch), LATER)
 
 
 def finish(**given: Any) -> FinishSession:
-    """The recording is finished."""
+    """Return the second half of an end."""
     done = {"recording": "s1.mcap", "sha256": "ab" * 32, "counts": {"decision": 3}}
     return FinishSession(**{"command_id": "end", "session": "s1", **done, **given})
 

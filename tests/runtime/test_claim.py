@@ -1,4 +1,4 @@
-"""Each owner is there once: another mesh on the router is told apart from a service's own former life."""
+"""The claim: each owner exists once, and another mesh is told apart from an earlier process of the same one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KEY = "shift/v1/@service/monitor/health"
 
 
 def monitor(hub: Hub, mesh: str, since_s: int) -> Claim:
-    """A monitor that answers."""
+    """Return the claim of a monitor that answers."""
     bus = MemoryBus(hub)
     health = Health(service="monitor", ready=True, mesh=mesh, since=Stamp(sec=since_s, nsec=0), data=f"/{mesh}")
     bus.serve(KEY, lambda request: request.reply(encode(health)))
@@ -27,7 +27,7 @@ def monitor(hub: Hub, mesh: str, since_s: int) -> Claim:
 
 
 async def kept(claim: Claim) -> str:
-    """What comes of looking again for a while."""
+    """Return the outcome of keeping a claim for a while: the refusal, the warning or nothing."""
     try:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(claim.keep(), 0.2)

@@ -1,4 +1,4 @@
-"""The journal: everything of a commit or nothing, pages of the outbox, reopening, kill -9, a full disk."""
+"""The journal: whole commits, pages of the outbox, reopening, kill -9, and a full disk."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def opened(path: Path) -> Journal:
 
 
 def filled(path: Path, **rows: int) -> Journal:
-    """A journal with that many facts in each session."""
+    """Return a journal with so many facts in each session."""
     journal = opened(path)
     for session, count in rows.items():
         journal.commit(
@@ -241,7 +241,7 @@ def test_kill_9_during_commits_leaves_1_to_n_and_everything_acknowledged(path: P
 
 @contextmanager
 def files_up_to(size: int) -> Iterator[None]:
-    """No file of this process may grow beyond ``size`` bytes, as on a full disk."""
+    """Limit every file of this process to ``size`` bytes, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.anyio
 
 @dataclass
 class Around:
-    """A bus whose owners answer as they are told to, and a clock that stands where it is put."""
+    """A bus whose owners answer as the test decides, and a clock that the test sets."""
 
     now: float = 100.0
     by_router: set[str] = field(default_factory=set)

@@ -129,7 +129,7 @@ async def test_health_and_metrics_are_none_and_nothing_without_an_answer(bus: Me
 
 async def test_attempts_that_time_out_while_the_service_waits_still_carry_the_command_out_once(tmp_path: Path) -> None:
     rig = Rig(tmp_path / "decider.sqlite")
-    rig.recorder.put_out(session(), config())
+    rig.recorder.publish(session(), config())
     rig.start()
     await rig.ready()
     client = MeshClient(rig.bus)

@@ -1,9 +1,8 @@
-"""The reader: exactly cursor + 1, whatever becomes of the hints and of the owner."""
+"""The reader: it delivers exactly cursor + 1, whatever happens to notifications and to the owner."""
 
 from __future__ import annotations
 
 import asyncio
-import itertools
 from collections.abc import Coroutine
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,51 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_runtime import reader as reader_module
 from shift_runtime.bus.memory import Hub, MemoryBus
-from shift_runtime.bus.protocol import Bus, Handle, Request
+from shift_runtime.bus.protocol import Bus, Request
 from shift_runtime.reader import Reader, ReadFact, fact_of
-from shift_schemas.codec import decode, encode
+from shift_schemas.codec import encode
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import FactKey, ServiceKey, build_key
-from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
+from shift_schemas.messages import OutboxPage, OutboxRow
+from support.outbox_owner import Owner
 from support.runtime_fixtures import marker, row, until
 
 OUTBOX = build_key(ServiceKey("recorder", "outbox"))
 
 
-@dataclass
-class Owner:
-    """Puts out markers as the recorder does, with pages of ``most`` rows. It can die and come back."""
-
-    bus: Bus
-    most: int = 3
-    rows: dict[str, list[OutboxRow]] = field(default_factory=dict)
-    asked: list[OutboxQuery] = field(default_factory=list)
-    _served: Handle | None = None
-
-    def live(self) -> Owner:
-        self._served = self.bus.serve(OUTBOX, self._page)
-        return self
-
-    def die(self) -> None:
-        assert self._served is not None
-        self._served.close()
-
-    def commit(self, count: int, session: str = "s1") -> None:
-        rows = self.rows.setdefault(session, [])
-        rows += [row(len(rows) + 1 + i, session) for i in range(count)]
-
-    def hint(self, seq: int, session: str = "s1") -> None:
-        found = self.rows[session][seq - 1]
-        self.bus.put(build_key(FactKey(session, "marker")), found.payload.encode(), attachment=str(seq).encode())
-
-    def _page(self, request: Request) -> None:
-        query = decode(OutboxQuery, request.payload)
-        self.asked.append(query)
-        wanted = self.rows if query.only is None else {s: self.rows.get(s, []) for s in query.only}
-        rows = list(itertools.chain.from_iterable(found[query.cursors.get(s, 0) :] for s, found in wanted.items()))
-        heads = {s: len(found) for s, found in wanted.items()}
-        page = OutboxPage(owner="recorder", rows=rows[: self.most], heads=heads, complete=len(rows) < self.most)
-        request.reply(encode(page))
+def recorder(bus: Bus, most: int = 3) -> Owner:
+    """Return an owner of sessions with pages of ``most`` rows."""
+    return Owner(bus, "recorder", most)
 
 
 @dataclass
@@ -82,7 +51,7 @@ class Reading:
 
 async def read_up() -> tuple[Owner, Reading]:
     bus = MemoryBus(Hub())
-    return Owner(bus).live(), Reading(bus)
+    return recorder(bus).live(), Reading(bus)
 
 
 async def settled() -> None:
@@ -94,7 +63,7 @@ def run(work: Coroutine[Any, Any, None]) -> None:
     asyncio.run(work)
 
 
-# --- hints ---
+# --- notifications ---
 
 
 def test_notifications_in_order_are_delivered_without_a_pull() -> None:
@@ -102,7 +71,7 @@ def test_notifications_in_order_are_delivered_without_a_pull() -> None:
         owner, reading = await read_up()
         owner.commit(3)
         for n in (1, 2, 3):
-            owner.hint(n)
+            owner.notify(n)
         await settled()
         assert [(r.owner, r.seq, r.fact, r.payload) for r in reading.found] == [
             ("recorder", n, marker(n), marker(n).model_dump_json()) for n in (1, 2, 3)
@@ -116,8 +85,8 @@ def test_gap_is_pulled_at_once() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(8)
-        owner.hint(1)
-        owner.hint(8)
+        owner.notify(1)
+        owner.notify(8)
         await until(lambda: reading.sequence() == list(range(1, 9)))
         assert owner.asked[0].cursors == {"s1": 1}
 
@@ -129,7 +98,7 @@ def test_delivered_fact_is_not_delivered_again() -> None:
         owner, reading = await read_up()
         owner.commit(2)
         for n in (1, 1, 2, 1, 2, 2):
-            owner.hint(n)
+            owner.notify(n)
         await settled()
         await reading.reader.pull("recorder")
         assert reading.sequence() == [1, 2]
@@ -153,7 +122,7 @@ def test_pull_without_notifications_reads_page_by_page_to_the_end() -> None:
 def test_reader_continues_at_its_cursor() -> None:
     async def test() -> None:
         bus = MemoryBus(Hub())
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         reading = Reading(bus, cursors={("s1", "recorder"): 4})
         owner.commit(6)
         await reading.reader.pull("recorder")
@@ -187,7 +156,7 @@ def test_invalid_notification_is_counted_and_dropped(key: str, payload: bytes, a
         await settled()
         assert reading.found == []
         assert reading.dropped == ["malformed"]
-        owner.hint(1)
+        owner.notify(1)
         await settled()
         assert reading.sequence() == [1]
 
@@ -208,10 +177,10 @@ def test_forgotten_session_is_not_read_any_more() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
-        owner.hint(1)
+        owner.notify(1)
         await settled()
         reading.reader.forget("s1")
-        owner.hint(2)
+        owner.notify(2)
         await settled()
         assert await reading.reader.pull("recorder")
         assert reading.sequence() == [1]
@@ -238,10 +207,10 @@ def test_absent_owner_gives_no_answer_and_nothing_is_lost() -> None:
 
 
 def test_no_owner_is_synced_before_the_recorder() -> None:
-    """Facts of a session that nobody told of are held back: an owner read that early is not read."""
+    """Facts of an unknown session are deferred, so an owner that was read that early is not synced."""
 
     async def test() -> None:
-        owner = Owner(MemoryBus(hub := Hub()))
+        owner = recorder(MemoryBus(hub := Hub()))
         learner = MemoryBus(hub)
         page = OutboxPage(owner="learner", rows=[], heads={}, complete=True)
         learner.serve(build_key(ServiceKey("learner", "outbox")), lambda request: request.reply(encode(page)))
@@ -291,7 +260,7 @@ def test_invalid_page_is_counted_and_another_answer_is_used(page: bytes) -> None
         bus = MemoryBus(Hub())
         bus.serve(OUTBOX, lambda r: r.reply(page))
         bus.serve(OUTBOX, lambda r: r.refuse(b"no"))
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         owner.commit(2)
         reading = Reading(bus)
         assert await reading.reader.pull("recorder")
@@ -323,9 +292,9 @@ def test_row_of_an_unknown_subject_or_another_session_is_malformed(bad: OutboxRo
 
 def test_pull_without_progress_ends() -> None:
     async def test() -> None:
-        """Facts of a session that cannot be taken yet (the gateway's replica, before the recorder answers)."""
+        """Put back a fact whose session is not known yet, as the gateway's read model does."""
         bus = MemoryBus(Hub())
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         owner.commit(10)
 
         def not_yet(read: ReadFact) -> None:
@@ -340,11 +309,11 @@ def test_pull_without_progress_ends() -> None:
 
 
 def test_rows_of_finished_sessions_do_not_hide_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An owner that has not closed the session yet offers all of it again: it must not fill every page."""
+    """An owner that has not closed the session yet sends all of it again; that must not fill every page."""
 
     async def test() -> None:
         bus = MemoryBus(Hub())
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         owner.commit(10, "s1")
         reading = Reading(bus)
         await reading.reader.pull("recorder")
@@ -380,7 +349,7 @@ def test_reader_pulls_periodically(monkeypatch: pytest.MonkeyPatch) -> None:
 
 EVENT = st.one_of(
     st.tuples(st.just("commit"), st.integers(1, 4)),
-    st.tuples(st.just("hint"), st.integers(1, 40)),
+    st.tuples(st.just("notification"), st.integers(1, 40)),
     st.tuples(st.just("junk"), st.sampled_from([b"", b"{}", b"\xff", b"null"])),
     st.tuples(st.just("pull"), st.just(0)),
     st.tuples(st.just("wait"), st.integers(1, 5)),
@@ -390,61 +359,80 @@ EVENT = st.one_of(
 )
 
 
+class Interleaving:
+    """A reader and its owner, either of which may stop at any point, and what the reader has committed."""
+
+    def __init__(self, most: int) -> None:
+        self.bus = MemoryBus(Hub())
+        self.owner = recorder(self.bus, most).live()
+        self.alive = True
+        self.reading = Reading(self.bus)
+        self.delivered: dict[str, list[int]] = {"s1": [], "s2": []}
+
+    async def apply(self, session: str, kind: str, value: Any) -> None:
+        """Let one event happen."""
+        rows = self.owner.rows.setdefault(session, [])
+        match kind:
+            case "commit":
+                self.owner.commit(value, session)
+            case "notification" if value <= len(rows):
+                self.owner.notify(value, session)
+            case "junk":
+                self.bus.put(build_key(FactKey(session, "marker")), value, attachment=str(len(rows) + 1).encode())
+            case "pull":
+                self.reading.reader.pull_soon("recorder")
+            case "wait":
+                for _ in range(value):
+                    await asyncio.sleep(0)
+            case "die" if self.alive:
+                self.owner.die()
+                self.alive = False
+            case "live":
+                self.revive()
+            case "reader dies":
+                await self.restart_reader(value)
+
+    def revive(self) -> None:
+        """Let the owner answer."""
+        if not self.alive:
+            self.owner.live()
+            self.alive = True
+
+    def keep(self, lost: int) -> None:
+        """Commit what the reader delivered, all but the last ``lost`` facts of each session."""
+        for session, sequence in self.delivered.items():
+            sequence += self.reading.sequence(session)
+            if lost:
+                del sequence[-lost:]
+
+    async def restart_reader(self, lost: int) -> None:
+        """Replace the reader by one that continues where the old one had committed."""
+        await settled()
+        self.keep(lost)
+        await self.bus.close()
+        if self.alive:
+            self.owner.live()
+        self.reading = Reading(self.bus, {(s, "recorder"): len(n) for s, n in self.delivered.items()})
+
+
 @settings(max_examples=300, deadline=None)
 @given(
     events=st.lists(st.tuples(st.sampled_from(["s1", "s2"]), EVENT), max_size=40),
     most=st.integers(1, 5),
 )
 def test_any_interleaving_delivers_1_to_n_once_in_order(events: list[Any], most: int) -> None:
-    """Hints lost, doubled, late or malformed, pulls in between, the owner or the reader restarted at any point."""
+    """Notifications are lost, doubled, late or malformed; pulls and restarts come at any point."""
 
     async def test() -> None:
-        bus = MemoryBus(Hub())
-        owner = Owner(bus, most).live()
-        reading, alive = Reading(bus), True
-        delivered: dict[str, list[int]] = {"s1": [], "s2": []}
-
-        def keep(upto: int) -> None:
-            """What a reader that died had committed: all but the last ``upto`` that it was given."""
-            for session, sequence in delivered.items():
-                sequence += reading.sequence(session)
-                if upto:
-                    del sequence[-upto:]
-
+        mesh = Interleaving(most)
         for session, (kind, value) in events:
-            rows = owner.rows.setdefault(session, [])
-            match kind:
-                case "commit":
-                    owner.commit(value, session)
-                case "hint" if value <= len(rows):
-                    owner.hint(value, session)
-                case "junk":
-                    bus.put(build_key(FactKey(session, "marker")), value, attachment=str(len(rows) + 1).encode())
-                case "pull":
-                    reading.reader.pull_soon("recorder")
-                case "wait":
-                    for _ in range(value):
-                        await asyncio.sleep(0)
-                case "die" if alive:
-                    owner.die()
-                    alive = False
-                case "live" if not alive:
-                    owner.live()
-                    alive = True
-                case "reader dies":
-                    await settled()
-                    keep(value)
-                    await bus.close()
-                    if alive:
-                        owner.live()
-                    reading = Reading(bus, {(s, "recorder"): len(n) for s, n in delivered.items()})
-        if not alive:
-            owner.live()
+            await mesh.apply(session, kind, value)
+        mesh.revive()
         await settled()
-        assert await reading.reader.pull("recorder")
-        keep(0)
-        for session, rows in owner.rows.items():
-            assert delivered[session] == list(range(1, len(rows) + 1))
+        assert await mesh.reading.reader.pull("recorder")
+        mesh.keep(0)
+        for session, rows in mesh.owner.rows.items():
+            assert mesh.delivered[session] == list(range(1, len(rows) + 1))
 
     run(test())
 

@@ -1,4 +1,4 @@
-"""The recorder in one process with the tester, who plays the services that it waits for."""
+"""The recorder in the test's process; the test plays the services that the recorder waits for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every bus must give: one suite, run over the in-memory bus and over Zenoh."""
+"""The contract of every bus: one suite for the in-memory bus and for Zenoh."""
 
 from __future__ import annotations
 
@@ -203,7 +203,7 @@ async def _asked(bus: Bus, silent: list[Request]) -> bool:
 
 
 async def half_silent(open_bus: OpenBus) -> Bus:
-    """A bus; of the two servers under ``half``, one replies ``here`` and the other says nothing."""
+    """Return a bus with two servers under ``half``: one replies ``here`` and the other never replies."""
     one, other = await pair(open_bus)
     silent: list[Request] = []
     one.serve("half", silent.append)
@@ -224,7 +224,7 @@ async def test_replies_of_others_count_when_one_server_is_silent(open_bus: OpenB
 
 
 async def test_request_ends_with_the_reply_that_is_enough(open_bus: OpenBus) -> None:
-    """Nobody waits for a server that says nothing once another has said what was asked for."""
+    """A silent server is not awaited once another one has answered."""
     one = await half_silent(open_bus)
     loop = asyncio.get_running_loop()
     begun = loop.time()
@@ -277,7 +277,7 @@ async def test_flood_of_one_subscriber_loses_nothing_of_another(open_bus: OpenBu
 
 
 def _hold_the_loop(seconds: float) -> None:
-    """A handler that takes its time: meanwhile nothing is taken from what waits."""
+    """While a handler runs, no waiting request is taken."""
     time.sleep(seconds)
 
 

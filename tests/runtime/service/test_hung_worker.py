@@ -1,4 +1,4 @@
-"""A worker whose handler hangs: it goes silent, though its process, its session and its token live on."""
+"""A worker whose core hangs: it answers nothing, though its process, its bus and its token stay."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from support.worker_rig import CORE, Notes
 
 
 class Hanging(threading.Thread):
-    """A worker in a thread and a loop of its own; a decision about the task ``hang`` hangs until it is let go."""
+    """A worker in its own thread and loop. A decision about the task ``hang`` hangs until :attr:`let_go` is set."""
 
     def __init__(self, router: str, path: Path) -> None:
         super().__init__()

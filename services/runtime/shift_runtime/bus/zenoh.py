@@ -125,6 +125,51 @@ class _Handle:
             self.thing = self.declare(session)
 
 
+class _Replies:
+    """The replies to one request, passed from Zenoh's threads to the loop until the last one or one that is enough."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, enough: Callable[[Reply], bool] | None) -> None:
+        self._loop = loop
+        self._enough = enough
+        self._replies: list[Reply] = []
+        self._done: asyncio.Future[None] = loop.create_future()
+
+    async def all(self, timeout_s: float) -> list[Reply]:
+        """Return the replies once the request has ended, after ``timeout_s`` at the latest."""
+        limit = self._loop.call_later(timeout_s, self._end)
+        try:
+            await self._done
+        finally:
+            limit.cancel()
+        return self._replies
+
+    def on_reply(self, reply: zenoh.Reply) -> None:
+        """Receive a reply, in a thread of Zenoh's."""
+        if reply.ok is not None:
+            self._pass_on(self._take, Reply(True, reply.ok.payload.to_bytes()))
+        elif reply.err is not None and (said := reply.err.payload.to_bytes()) not in NO_REPLY:
+            self._pass_on(self._take, Reply(False, said))
+
+    def on_end(self) -> None:
+        """Receive the end of the replies, in a thread of Zenoh's."""
+        self._pass_on(self._end)
+
+    def _pass_on(self, handle: Callable[..., None], *arguments: Reply) -> None:
+        if not self._done.done():  # replies after the last one wake nobody
+            with contextlib.suppress(RuntimeError):  # the loop is closed: the process is ending
+                self._loop.call_soon_threadsafe(handle, *arguments)
+
+    def _take(self, reply: Reply) -> None:
+        if not self._done.done():
+            self._replies.append(reply)
+            if self._enough is not None and self._enough(reply):
+                self._done.set_result(None)
+
+    def _end(self) -> None:
+        if not self._done.done():
+            self._done.set_result(None)
+
+
 class ZenohBus:
     """One Zenoh session. Create it with :meth:`open` in the loop in which its handlers run."""
 
@@ -168,44 +213,16 @@ class ZenohBus:
         self, key: str, payload: bytes = b"", *, timeout_s: float, enough: Callable[[Reply], bool] | None = None
     ) -> list[Reply]:
         """See :class:`~shift_runtime.bus.protocol.Bus`."""
-        replies: list[Reply] = []
-        done: asyncio.Future[None] = self._loop.create_future()
-
-        def end() -> None:
-            if not done.done():
-                done.set_result(None)
-
-        def take(reply: Reply) -> None:
-            if not done.done():
-                replies.append(reply)
-                if enough is not None and enough(reply):
-                    done.set_result(None)
-
-        def hand_over(handle: Callable[..., None], *arguments: Reply) -> None:
-            if not done.done():  # replies after the last one wake nobody
-                with contextlib.suppress(RuntimeError):  # the loop is closed: the process is ending
-                    self._loop.call_soon_threadsafe(handle, *arguments)
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                hand_over(take, Reply(True, reply.ok.payload.to_bytes()))
-            elif reply.err is not None and (said := reply.err.payload.to_bytes()) not in NO_REPLY:
-                hand_over(take, Reply(False, said))
-
+        replies = _Replies(self._loop, enough)
         self.session.get(
             key,
-            direct(on_reply, lambda: hand_over(end)),
+            direct(replies.on_reply, replies.on_end),
             payload=payload or None,
             timeout=timeout_s,
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        limit = self._loop.call_later(timeout_s + 0.5, end)
-        try:
-            await done
-        finally:
-            limit.cancel()
-        return replies
+        return await replies.all(timeout_s + 0.5)
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
         """See :class:`~shift_runtime.bus.protocol.Bus`."""
