@@ -1,5 +1,5 @@
-"""The words of the SHIFT mesh: messages, keys, ids, errors and the study file.
+"""The vocabulary of the SHIFT mesh: messages and their registry, keys, ids, errors and timestamps.
 
-Pure: nothing in this package opens a socket, a file or a clock. Everything that travels between
-services, through a door or into a recording is defined here and nowhere else.
+The package is pure: it opens no socket and no file, and reads no clock. Everything that travels between services, to a
+client or into a recording is defined here and nowhere else.
 """

@@ -1,4 +1,4 @@
-"""Payloads: pydantic JSON, with an encoding that names the message and its version."""
+"""The payloads of messages: JSON by pydantic, with an encoding that names the message and its version. Pure."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ VERSION = "v1"
 
 
 def encoding_of(message: type[BaseModel]) -> str:
-    """``application/json;shift.Decision.v1``."""
+    """Return the encoding of a message, such as ``application/json;shift.Decision.v1``."""
     return f"application/json;shift.{message.__name__}.{VERSION}"
 
 
 def encode(message: BaseModel) -> bytes:
-    """The message as JSON."""
+    """Return the message as JSON."""
     return message.model_dump_json().encode()
 
 
 def encode_answer(owner: str, seq: int, repeat: bool, result: str) -> bytes:
-    """An :class:`Answer` around a ``result`` that is JSON already."""
-    around = Answer(owner=owner, seq=seq, repeat=repeat, result={}).model_dump_json()
-    return f"{around.removesuffix('{}}')}{result}}}".encode()
+    """Return an :class:`Answer` with a ``result`` that is JSON already."""
+    envelope = Answer(owner=owner, seq=seq, repeat=repeat, result={}).model_dump_json()
+    return f"{envelope.removesuffix('{}}')}{result}}}".encode()
 
 
 def decode(kind: type[M], payload: bytes | str) -> M:
-    """The message that ``payload`` spells; :class:`MalformedMessage` says what is wrong with it."""
+    """Return the message in ``payload``. Raise :class:`MalformedMessage`, which says what is wrong with it."""
     try:
         return kind.model_validate_json(payload)
     except ValidationError as e:

@@ -1,7 +1,7 @@
-"""Say how a command differs from the one that used its id before. Pure.
+"""The refusal of a command whose id was used before with another content. Pure.
 
-A command that is sent again gets its first result. The same id with another content is refused, and the refusal names
-the thing in the user's words, what differs with both values, and what to do.
+A command that is sent again gets its first result. The same id with another content is refused. The refusal names the
+thing in the user's words, the differences with both values, and what to do.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from shift_schemas.errors import Conflict, FieldError, shorten
 from shift_schemas.messages import Command
 
 SHOWN = 4
-"""So many differences are named; chosen: a sentence stays readable."""
+"""How many differences are named. Chosen so that the sentence stays readable."""
 NAMES = frozenset({"session", "procedure", "command_id"})
 """Fields that say which command it is. They are equal in both."""
 
 
 class _Wording(NamedTuple):
-    """How one kind of command is spoken of. ``{id}`` is the command's id, ``{session}`` its session."""
+    """The words for one kind of command. ``{id}`` is the command's id, ``{session}`` its session."""
 
     first: str
     again: str
@@ -45,7 +45,7 @@ _OTHER = _Wording("{procedure} {id} was asked before", "request", "Choose anothe
 
 
 class Difference(NamedTuple):
-    """One place where two contents differ. ``before`` and ``now`` are JSON values; None is what was left out."""
+    """One place where two contents differ. ``before`` and ``now`` are JSON values; None is a missing field."""
 
     field: str
     before: Any
@@ -55,7 +55,7 @@ class Difference(NamedTuple):
 def differences(before: str, now: str) -> list[Difference]:
     """Return where two contents (JSON objects, see :meth:`Command.content`) differ, by dotted field name.
 
-    The order of the fields is no difference, and neither is 1 for 1.0.
+    Another order of the fields is not a difference, and neither is 1 for 1.0.
     """
     return list(_differences("", json.loads(before), json.loads(now)))
 
@@ -79,8 +79,8 @@ def repeat_conflict(command: Command, before: str) -> Conflict:
     Parameters
     ----------
     before
-        The first command's content as JSON. Where it is not known (a journal of version 0.1.0 kept a digest only),
-        the sentence names no values.
+        The first command's content as JSON. If it is not known (a journal of version 0.1.0 has only a digest), the
+        sentence names no values.
     """
     words = _WORDINGS.get(command.procedure, _OTHER)
     first = words.first.format(id=command.command_id, session=command.session, procedure=command.procedure)
@@ -111,7 +111,7 @@ def _said(field: str, value: Any) -> str:
 
 
 def _text(value: Any) -> str:
-    """The value as a sentence holds it: an id as it is, text in quotes, anything else as JSON."""
+    """Return the value as a sentence shows it: an id as it is, text in quotes, anything else as JSON."""
     if isinstance(value, str) and value and " " not in value:
         return shorten(value)
     return shorten(json.dumps(value, ensure_ascii=False))

@@ -1,7 +1,7 @@
-"""The error tree. Each error names the value, the rule it broke and whose fault it is.
+"""The error tree. Each error names the value, the rule that it broke, and whose fault it is. Pure.
 
-An error crosses a boundary as a :class:`Problem`; ``Problem.of`` and ``Problem.error`` are inverses,
-so a service's refusal arrives at the door as the error that it was.
+An error crosses a boundary as a :class:`Problem`. ``Problem.of`` and ``Problem.error`` are inverses, so a service's
+refusal arrives at the client as the same error.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 from shift_schemas.ids import ID_PATTERN, is_id, not_an_id
 
 VALUE_LENGTH = 80
-"""How much of a refused value is said back: enough to find it, too little to echo an attack."""
+"""How many characters of a refused value an error repeats: enough to find it, too few to echo an attack."""
 
 
 class FieldError(BaseModel):
@@ -29,7 +29,7 @@ class FieldError(BaseModel):
 
 
 class ShiftError(Exception):
-    """The root. ``kind`` is its name on the wire, ``status`` its HTTP status."""
+    """The root of the tree. ``kind`` is the error's name on the wire, ``status`` its HTTP status."""
 
     kind: ClassVar[str] = "internal"
     status: ClassVar[int] = 500
@@ -42,7 +42,7 @@ class ShiftError(Exception):
 
 
 class MalformedMessage(ShiftError):
-    """The peer's fault: what it sent does not follow the rules."""
+    """The sender's fault: its message does not follow the rules."""
 
     kind = "malformed"
     status = 422
@@ -64,7 +64,7 @@ class InvalidStudy(MalformedMessage):
 
 
 class UnknownThing(ShiftError):
-    """A session, task, decision or recording that is not there."""
+    """A session, task, decision or recording that does not exist."""
 
     kind = "unknown"
     status = 404
@@ -72,7 +72,7 @@ class UnknownThing(ShiftError):
 
 
 class Conflict(ShiftError):
-    """An id repeated with another content, an ended session, a gaze source that was replaced."""
+    """An id repeated with another content, a session that has ended, or a gaze source that was replaced."""
 
     kind = "conflict"
     status = 409
@@ -88,7 +88,7 @@ class TooLarge(ShiftError):
 
 
 class Unavailable(ShiftError):
-    """A service that does not answer, or cannot know yet. Never a statement about the thing asked for."""
+    """A service that does not answer, or cannot know yet. It states nothing about the thing that was asked for."""
 
     kind = "unavailable"
     status = 503
@@ -96,14 +96,14 @@ class Unavailable(ShiftError):
 
 
 class InvalidSettings(ShiftError):
-    """Our user's fault at start: a flag, variable or file of this installation."""
+    """The user's fault at the start: a flag, variable or file of this installation."""
 
     kind = "invalid-settings"
     title = "The settings have a mistake"
 
 
 class DamagedRecording(ShiftError):
-    """A recording that cannot be read further, or is not what its checksum says."""
+    """A recording that cannot be read further, or that does not match its checksum."""
 
     kind = "damaged-recording"
     status = 422
@@ -130,27 +130,27 @@ class Problem(BaseModel):
 
     @classmethod
     def of(cls, error: ShiftError) -> Problem:
-        """The travelling form of ``error``."""
+        """Return the form in which ``error`` travels."""
         return cls(kind=error.kind, detail=error.detail, errors=error.errors)
 
     def error(self) -> ShiftError:
-        """The error that this was."""
+        """Return the error that this problem was made from."""
         return _KINDS.get(self.kind, ShiftError)(self.detail, self.errors)
 
 
 def shorten(value: Any) -> str:
-    """``value`` as text of at most ``VALUE_LENGTH`` characters, safe to say back."""
+    """Return ``value`` as text of at most ``VALUE_LENGTH`` printable characters, safe to repeat."""
     text = value if isinstance(value, str) else repr(value)
     text = "".join(c if c.isprintable() else "�" for c in text[: VALUE_LENGTH + 1])
     return text if len(text) <= VALUE_LENGTH else text[: VALUE_LENGTH - 1] + "…"
 
 
 _BRANCH = re.compile(r"constrained-str|[a-z-]+\[.*\]", re.DOTALL)
-"""What pydantic calls the branch of a union or the key of a map: no field of the peer's."""
+"""Pydantic's names for the branch of a union or the key of a map, which are not fields of the sender."""
 
 
 def field_errors(error: ValidationError, prefix: str = "") -> tuple[FieldError, ...]:
-    """Pydantic's complaints as field errors, at most twenty of them."""
+    """Return pydantic's errors as field errors, at most 20 of them."""
     found = []
     for e in error.errors(include_url=False)[:20]:
         names = [str(part) for part in e["loc"] if not _BRANCH.fullmatch(str(part))]
@@ -165,16 +165,16 @@ def field_errors(error: ValidationError, prefix: str = "") -> tuple[FieldError, 
 
 
 def id_mistake(error: ErrorDetails) -> str | None:
-    """Return the sentence for a field that is not an id, and None for another mistake: a pattern helps nobody."""
+    """Return the sentence for a field that is not an id; None for another mistake. A pattern would not help anybody."""
     if error["type"] == "string_pattern_mismatch" and error.get("ctx", {}).get("pattern") == ID_PATTERN:
         return not_an_id(str(error["input"]))
     return None
 
 
 def check_id(name: str, value: str) -> str:
-    """Return ``value``. Raise :class:`MalformedMessage` with the rule and a proposal where it is not an id.
+    """Return ``value``. Raise :class:`MalformedMessage` with the rule and a proposal if it is not an id.
 
-    ``name`` is the field, path part or flag that it stands in.
+    ``name`` is the field, path part or flag that contains it.
     """
     if not is_id(value):
         rule = not_an_id(value)
@@ -183,7 +183,7 @@ def check_id(name: str, value: str) -> str:
 
 
 def malformed(what: str, error: ValidationError) -> MalformedMessage:
-    """A :class:`MalformedMessage` that says what is wrong with ``what``."""
+    """Return a :class:`MalformedMessage` that says what is wrong with ``what``."""
     errors = field_errors(error)
     first = errors[0]
     return MalformedMessage(f"{what}: {first.field}: {first.rule}", errors)

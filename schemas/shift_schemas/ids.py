@@ -1,6 +1,6 @@
-"""Ids: one rule, checked in one place, for keys, file names and URLs alike.
+"""Ids: one rule, checked in one place, for keys, file names and URLs. Pure.
 
-Zenoh would accept ``**`` or ``a/b`` as an id and make a wildcard or another key of it.
+Zenoh accepts ``**`` or ``a/b`` in a key, and would take such an id for a wildcard or another key.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ ID_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,62}$"
 ID_RULE = "1 to 63 letters, digits, - and _, beginning with a letter or digit"
 ID_LENGTH = 63
 ID_EXAMPLE = "P01"
-"""What is proposed where nothing of the text can be kept."""
+"""The proposal for a text of which nothing can be kept."""
 _ID = re.compile(ID_PATTERN[1:-1])
 _SAID = 40
-"""How many characters of a refused text a sentence says back."""
+"""How many characters of a refused text a sentence repeats."""
 _LETTERS = str.maketrans(
     {"ä": "ae", "ö": "oe", "ü": "ue", "Ä": "Ae", "Ö": "Oe", "Ü": "Ue", "ß": "ss", "ẞ": "SS", "æ": "ae", "Æ": "Ae",
      "ø": "oe", "Ø": "Oe", "œ": "oe", "Œ": "Oe", "å": "aa", "Å": "Aa", "ł": "l", "Ł": "L", "đ": "d", "Đ": "D",
@@ -26,11 +26,12 @@ _LETTERS = str.maketrans(
 )  # fmt: skip
 
 Id = Annotated[str, StringConstraints(pattern=ID_PATTERN)]
-"""A participant, session, task, AOI, source or ``..._id``. Pydantic's ``$`` is the very end, before no newline."""
+"""A participant, session, task, AOI, source or ``..._id``. Pydantic's ``$`` matches only the very end of the text."""
 
 
 def is_id(text: object) -> bool:
-    """Whether ``text`` is an id. ``fullmatch``, so that a trailing newline does not slip through."""
+    """Return whether ``text`` is an id."""
+    # ``$`` would also match before a newline at the end
     return isinstance(text, str) and _ID.fullmatch(text) is not None
 
 
@@ -38,7 +39,7 @@ def propose_id(text: str) -> str:
     """Return an id that reads like ``text``: ``P 01`` gives ``P-01``, ``Müller`` gives ``Mueller``.
 
     Umlauts and accents are transliterated, digits of other scripts become 0 to 9, everything else becomes a hyphen, and
-    the result is cut to 63 characters. An id is returned as it is. Where nothing can be kept, the result is ``P01``.
+    the result is cut to 63 characters. An id is returned as it is. If nothing can be kept, the result is ``P01``.
     """
     if is_id(text):
         return text
@@ -57,7 +58,7 @@ def not_an_id(text: str) -> str:
 def _plain(character: str) -> str:
     if character.isascii():
         return character
-    if unicodedata.category(character) in ("Mn", "Cf"):  # accents, and what has no width
+    if unicodedata.category(character) in ("Mn", "Cf"):  # accents, and characters without a width
         return ""
     digit = unicodedata.decimal(character, None)
     return " " if digit is None else str(digit)

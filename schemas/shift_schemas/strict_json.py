@@ -1,4 +1,4 @@
-"""JSON without the liberties that Python takes: nothing infinite, no key twice, no bottomless nesting. Pure."""
+"""Strict JSON: no infinite numbers, no repeated keys, no unlimited nesting, all of which Python accepts. Pure."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from shift_schemas.errors import FieldError, MalformedMessage
 
 
 class NotJson(MalformedMessage):
-    """Text that is not JSON at all; a door may say more about it."""
+    """Text that is not JSON at all; the gateway explains it further."""
 
 
 def parse_json(raw: bytes | str) -> Any:
-    """What ``raw`` says. Raises :class:`MalformedMessage` with the rule that it breaks."""
+    """Return the value of ``raw``. Raise :class:`MalformedMessage` with the rule that it breaks."""
     try:
         return json.loads(raw, object_pairs_hook=_once, parse_constant=_no_constant, parse_float=_finite)
     except (ValueError, RecursionError) as e:
@@ -41,4 +41,4 @@ def _finite(text: str) -> float:
 
 
 def _no_constant(name: str) -> Any:
-    raise _Refused(f"{name} is no number in JSON")
+    raise _Refused(f"{name} is not a number in JSON")

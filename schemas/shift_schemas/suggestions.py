@@ -1,6 +1,6 @@
-"""What was probably meant: the nearest known name, and an id made of any text. Pure.
+"""Suggestions for mistyped names: the nearest known name, and a level made of any text. Pure.
 
-Every refusal of a name says which names there are and ends with :func:`did_you_mean`.
+Every refusal of a name lists the known names and ends with :func:`did_you_mean`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from shift_schemas.ids import propose_id
 
 
 def nearest(given: object, known: Iterable[str]) -> str | None:
-    """Return the name that ``given`` most resembles, upper and lower case alike; ``None`` if it resembles none."""
+    """Return the name that ``given`` resembles most, whatever its case; ``None`` if it resembles none."""
     by_case: dict[str, str] = {}
     for name in known:
         by_case.setdefault(name.casefold(), name)

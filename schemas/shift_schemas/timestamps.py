@@ -1,7 +1,7 @@
-"""Stamps: ``{sec, nsec}`` on the wire, integer nanoseconds in the code.
+"""Stamps: ``{sec, nsec}`` on the wire, integer nanoseconds in the code. Pure.
 
-JSON numbers of nanoseconds lose digits in every browser, hence the two fields. Order within a source
-is by its own sequence number, never by a stamp.
+A stamp has two fields because browsers lose digits of a JSON number of nanoseconds. The sequence number of a source
+defines the order of its messages; a stamp never does.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ class Stamp(BaseModel):
 
     @classmethod
     def of(cls, ns: int) -> Stamp:
-        """The stamp of ``ns`` nanoseconds since the epoch."""
+        """Return the stamp of ``ns`` nanoseconds since the epoch."""
         return cls(sec=ns // NS, nsec=ns % NS)
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from shift_gateway.origins import Asked, ForeignOrigin, Rules, WrongHost
+from shift_gateway.origins import ForeignOrigin, RequestOrigin, Rules, WrongHost
 from shift_gateway.settings import GatewaySettings
 from shift_runtime.settings import read_settings
 from shift_schemas.errors import InvalidSettings
@@ -14,9 +14,9 @@ RULES = Rules("0.0.0.0", ("gateway", "lab-pc.example.org"), ("https://lab.exampl
 HERE = "127.0.0.1:8080"
 
 
-def asked(method: str = "POST", host: str = HERE, *origins: str, **given: Any) -> Asked:
+def asked(method: str = "POST", host: str = HERE, *origins: str, **given: Any) -> RequestOrigin:
     """A request."""
-    return Asked(method, (host,), origins, **given)
+    return RequestOrigin(method, (host,), origins, **given)
 
 
 @pytest.mark.parametrize(
@@ -49,8 +49,8 @@ def test_the_refusal_of_a_host_says_what_to_set() -> None:
 
 def test_two_hosts_are_refused_and_none_is_answered() -> None:
     with pytest.raises(WrongHost, match="names 2 hosts"):
-        RULES.check(Asked("GET", (HERE, HERE)))
-    assert RULES.check(Asked("GET")) is None, "HTTP/1.0 has none, and a browser always sends one"
+        RULES.check(RequestOrigin("GET", (HERE, HERE)))
+    assert RULES.check(RequestOrigin("GET")) is None, "HTTP/1.0 has none, and a browser always sends one"
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from support.message_strategies import json_values
 @pytest.mark.parametrize(
     ("text", "says"),
     [('{"a":1,"a":2}', "a key is given twice"), ('{"b":[{"a":1,"a":1}]}', "a key is given twice"),
-     ("NaN", "NaN is no number"), ('{"a":Infinity}', "Infinity is no number"), ("[-Infinity]", "-Infinity"),
+     ("NaN", "NaN is not a number"), ('{"a":Infinity}', "Infinity is not a number"), ("[-Infinity]", "-Infinity"),
      ('{"a":1e999}', "a number must be finite"), ("[-1e400]", "must be finite"), ("", "must be JSON"),
      ("{", "must be JSON"), ("[" * 100_000, "must be JSON"), ("9" * 10_000, "must be JSON"),
      ("{'a':1}", "must be JSON"),

@@ -54,7 +54,7 @@ def _plain(value: dict[str, Any]) -> dict[str, Any]:
         if any(isinstance(v, float) and not isfinite(v) for v in level):
             raise ValueError("a number must be finite")
         if any(isinstance(v, str) and not v.isascii() and any("\ud800" <= c <= "\udfff" for c in v) for v in level):
-            raise ValueError("half of a character (a lone surrogate) is no text")
+            raise ValueError("half of a character (a lone surrogate) is not text")
         inner = [v for v in level if isinstance(v, (dict, list))]
         level = [w for v in inner for w in ((*v, *v.values()) if isinstance(v, dict) else v)]
         if not level:
@@ -73,11 +73,11 @@ class Message(BaseModel):
 
 
 class Seen(Message):
-    """How far the sender had read each of its inputs; as ``need``, how far the answerer must have."""
+    """How far the sender had read each of its inputs; as ``need``, how far the answerer must have read them."""
 
     gaze: dict[Id, Count] = Field(default={}, description="Per source, the last chunk's number.")
     decision: Count = Field(default=0, description="Number of the last decision.")
-    performance: Count = Field(default=0, description="How many performances.")
+    performance: Count = Field(default=0, description="Number of the last performance.")
     config: Count = Field(default=0, description="Version of the configuration.")
     observation: Count = Field(default=0, description="Version of the observation.")
     policy: Count = Field(default=0, description="Version of the policy.")
@@ -95,8 +95,8 @@ class Fact(Message):
     listed_last: ClassVar[bool] = False
     """Whether its topic follows the topics of all other owners."""
 
-    session: Id = Field(description="The session it belongs to.")
-    stamp: Stamp = Field(description="When its owner made it, wall clock; order is by the owner's sequence.")
+    session: Id = Field(description="The session that it belongs to.")
+    stamp: Stamp = Field(description="When its owner made it, wall clock. The owner's sequence defines the order.")
     seen: Seen = Field(default=Seen(), description="How far its owner had read its inputs.")
 
 
@@ -155,7 +155,9 @@ class Command(Message):
 
     command_id: Id
     session: Id
-    need: Seen = Field(default=Seen(), description="What the answerer must have seen: read your own writes.")
+    need: Seen = Field(
+        default=Seen(), description="What the answerer must have read, so that you read your own writes."
+    )
 
     def content(self) -> str:
         """Return what a repeat must be equal in: everything but what the sender had read by then."""

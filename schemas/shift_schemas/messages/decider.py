@@ -6,7 +6,7 @@ from pydantic import Field
 from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass, PolicySource
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Strategy, Text
+from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Seen, Strategy, Text
 
 
 class TripleView(Message):
@@ -31,15 +31,15 @@ class Estimate(Fact):
 
 
 class Versions(Message):
-    """What a decision was derived from."""
+    """The versions of the inputs that a decision was derived from."""
 
     observation: Count
-    policy: Count = Field(description="0: there was none.")
+    policy: Count = Field(description="0: there was no policy.")
     config: Count
 
 
 class Decision(Fact):
-    """Which strategy, and why."""
+    """The strategy to use, and why."""
 
     owner = "decider"
     subject = "decision"
@@ -56,20 +56,23 @@ class Decision(Fact):
     actions: list[Strategy] = Field(description="All actions, in their fixed order.")
     probabilities: list[float] = Field(description="The policy's row, per action; sums to 1.")
     propensity: float | None = Field(
-        default=None, description="Probability of the strategy taken; none where it was overridden."
+        default=None, description="Probability of the chosen strategy; left out for an override."
     )
-    explored: bool = Field(description="Not the greedy action.")
+    explored: bool = Field(description="Whether it is not the greedy action.")
     policy_source: PolicySource = Field(description="learner, last_policy, scoring or override.")
     versions: Versions
-    stale: bool = Field(description="The observation had not seen all that it must have.")
+    stale: bool = Field(description="Whether the observation had not seen all that it must have.")
     state: str = Field(description="The row of the policy that was drawn from.")
     seed: Count = Field(description="The session's seed; the draw's generator is seeded by (seed, n).")
-    override_id: str = Field(default="", description="The override that it follows; '' is none.")
+    required: Seen | None = Field(
+        default=None, description="How far the decider had to have read its inputs; left out before format 3."
+    )
+    override_id: str = Field(default="", description="The override that it follows; '' is no override.")
     reason: str = Field(default="", description="The override's reason.")
 
 
 class Override(Fact):
-    """The experimenter chose the strategy of a task's next decision."""
+    """The strategy that the experimenter chose for a task's next decision."""
 
     owner = "decider"
     subject = "override"

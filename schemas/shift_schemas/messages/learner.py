@@ -13,20 +13,20 @@ from shift_schemas.messages.decider import Versions
 
 
 class Result(Message):
-    """How one dimension of the task went."""
+    """The result of the task in one dimension."""
 
     success: bool
     duration_s: Annotated[float, Field(ge=0, le=1e6)] = Field(description="Time to solve it (T), s.")
 
 
 class ScoredResult(Result):
-    """A result with its task performance."""
+    """A result and its task performance."""
 
     value: float = Field(description="success x exp(-decay x duration_s).")
 
 
 class Performance(Fact):
-    """How the task went, and the reward of it."""
+    """The result of a task, and its reward."""
 
     owner = "learner"
     subject = "performance"
@@ -39,15 +39,15 @@ class Performance(Fact):
     enabledness: ScoredResult
     reward: float
     cumulative_reward: float
-    corrects: bool = Field(default=False, description="It replaces an earlier report of the same decision.")
+    corrects: bool = Field(default=False, description="Whether it replaces an earlier report of the same decision.")
     result: Count = Field(
         default=0, description="Which of the task's results it is, from 1; a correction has that of the first report."
     )
-    warnings: Warnings = Field(default=[], description="What was accepted and may not be meant.")
+    warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake.")
 
 
 class Transition(Fact):
-    """What was learned from: state, action, reward."""
+    """What the learner learned from: state, action, reward."""
 
     owner = "learner"
     subject = "transition"
@@ -57,16 +57,16 @@ class Transition(Fact):
     state: str = Field(description="The row that was updated.")
     action: Strategy
     reward: float
-    propensity: float | None = Field(default=None, description="None where the action was an override.")
+    propensity: float | None = Field(default=None, description="Left out if the action was an override.")
     versions: Versions
     value: float = Field(description="The row's value of the action after the update.")
 
 
 class PolicyRow(Message):
-    """One state's row."""
+    """The policy in one state."""
 
     probabilities: list[float] = Field(description="Per action; sums to 1.")
-    values: list[float] = Field(description="What they were made from, per action.")
+    values: list[float] = Field(description="The values that the probabilities follow from, per action.")
     visits: list[Count] = Field(description="Reported decisions per action.")
 
 
@@ -79,10 +79,10 @@ class Policy(Fact):
 
     version: Count = Field(ge=1)
     learner: LearnerName
-    for_n: Count = Field(ge=1, description="The decision number that it holds for.")
+    for_n: Count = Field(ge=1, description="The number of the decision that it is for.")
     actions: list[Strategy]
     states: dict[str, PolicyRow]
-    epsilon: float | None = Field(default=None, description="Probability of exploring, where the learner has one.")
+    epsilon: float | None = Field(default=None, description="Probability of exploring, if the learner has one.")
     cumulative_reward: float = 0.0
 
 

@@ -12,12 +12,12 @@ from shift_schemas.timestamps import Stamp
 
 
 class OutboxQuery(Message):
-    """What a reader asks an owner: all facts after these cursors, and which sessions there are."""
+    """A reader's question to an owner: all facts after these cursors, and which sessions exist."""
 
     cursors: dict[Id, Count] = Field(default={}, description="Per session, the last sequence that was read.")
     limit: Annotated[int, Field(ge=1, le=10_000)] = 1000
-    only: list[Id] | None = Field(default=None, description="Only these sessions; none: all.")
-    closed: bool = Field(default=False, description="Sessions that ended as well.")
+    only: list[Id] | None = Field(default=None, description="Only these sessions; left out: all.")
+    closed: bool = Field(default=False, description="Include sessions that have ended.")
 
 
 class OutboxRow(Message):
@@ -30,32 +30,32 @@ class OutboxRow(Message):
 
 
 class OutboxPage(Message):
-    """The answer: rows in order, the heads of the sessions, and how far the owner itself has read."""
+    """An owner's answer: rows in order, the heads of the sessions, and how far the owner itself has read."""
 
     owner: str
     rows: list[OutboxRow]
     heads: dict[Id, Count]
     cursors: dict[Id, dict[str, Count]] = Field(default={}, description="session -> owner -> sequence read.")
-    complete: bool = Field(description="No more rows than these.")
+    complete: bool = Field(description="Whether these are all rows.")
 
 
 class Answer(Message):
-    """A command's or stream's reply: the acknowledgement."""
+    """The reply to a command or a stream's item: it is stored."""
 
     owner: str = Field(description="The service that answered.")
-    seq: Count = Field(description="The owner's sequence in this session with the effects of it.")
-    repeat: bool = Field(default=False, description="It had been carried out before; this is the first result.")
+    seq: Count = Field(description="The owner's sequence in this session that includes its effects.")
+    repeat: bool = Field(default=False, description="It was carried out before; this is the first result.")
     result: dict[str, Any]
 
 
 class Health(Message):
-    """A worker's own answer, through its own loop."""
+    """The health of a service, answered by the loop that does its work."""
 
     service: str = Field(description="The service that answers.")
-    ready: bool = Field(description="It has read every journal that it needs, and the disk takes its own.")
-    detail: str = Field(default="", description="What it waits for.")
+    ready: bool = Field(description="It has read every journal that it needs, and can write its own.")
+    detail: str = Field(default="", description="Why it is not ready.")
     sessions: Count = Field(default=0, description="Sessions in memory.")
-    unreached: list[str] = Field(default=[], description="Owners that it reads and that have not answered it lately.")
-    mesh: str = Field(default="", description="Id of its data folder: two owners under one key differ in it.")
+    unreached: list[str] = Field(default=[], description="Owners that it reads and that do not answer it.")
+    mesh: str = Field(default="", description="Id of its data folder; it tells two services of the same name apart.")
     since: Stamp | None = Field(default=None, description="When its process began.")
     data: str = Field(default="", description="Its data folder.")

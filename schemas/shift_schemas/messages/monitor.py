@@ -20,14 +20,14 @@ class Gaze(Fact):
 
     source: Id = Field(description="The gaze source.")
     seq: Count = Field(description="Number of the chunk within its source, from 0.")
-    segment: Count = Field(default=0, description="One more with each restart of the source's clock or numbering.")
+    segment: Count = Field(default=0, description="Counts the restarts of the source's clock or numbering.")
     outcome: GazeOutcome = Field(default="applied", description="late: recorded, not applied.")
     t: list[Seconds] = Field(description="Source clock, s.")
     x: list[float] = Field(default=[], description="0..1 from the left; empty for gaze on AOIs.")
     y: list[float] = Field(default=[], description="0..1 from the top; empty for gaze on AOIs.")
-    valid: list[bool] = Field(default=[], description="Whether the sample is one; empty for gaze on AOIs.")
-    aoi: list[str] = Field(default=[], description="AOI names, '' is none; empty for points.")
-    warnings: Warnings = Field(default=[], description="What was accepted and may not be meant, or has no effect.")
+    valid: list[bool] = Field(default=[], description="Whether the sample is valid; empty for gaze on AOIs.")
+    aoi: list[str] = Field(default=[], description="AOI names; '' is no AOI. Empty for points.")
+    warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake or has no effect.")
 
 
 class Fixation(Fact):
@@ -42,7 +42,7 @@ class Fixation(Fact):
     duration_s: Annotated[float, Field(ge=0)] = Field(description="Duration, s.")
     x: float = Field(description="Mean position, 0..1 from the left.")
     y: float = Field(description="Mean position, 0..1 from the top.")
-    aoi: str = Field(description="The AOI at the mean position; '' is none.")
+    aoi: str = Field(description="The AOI at the mean position; '' is no AOI.")
 
 
 class CapacityView(Message):
@@ -58,10 +58,10 @@ class GazeView(Message):
     category: GazeClass = Field(description="distracted, uncertain or focused.")
     weights: dict[Id, float] = Field(description="Attention weight per AOI; they sum to 1.")
     focus_shift: float = Field(description="Focus shift, 0..1.")
-    aoi: str = Field(description="The held target; '' is none.")
+    aoi: str = Field(description="The held target; '' is no AOI.")
     fixations: Count = Field(description="Finished fixations so far.")
-    dropped: Count = Field(description="Gaze chunks that never came, by their numbers.")
-    restarts: Count | None = Field(default=None, description="How often a source began its clock or numbering anew.")
+    dropped: Count = Field(description="How many gaze chunks never came, judged by their numbers.")
+    restarts: Count | None = Field(default=None, description="How often a source restarted its clock or numbering.")
     samples: Count | None = Field(default=None, description="Samples applied, all sources together.")
     dwell_s: float | None = Field(default=None, description="Dwell on AOIs in this session, s.")
     lost: float | None = Field(default=None, description="Share of the source's time without a valid sample, 0..1.")
@@ -75,7 +75,7 @@ class GazeView(Message):
 
 
 class AwarenessView(Message):
-    """What the results of one task say."""
+    """The awareness in one task, derived from its results."""
 
     category: AwarenessClass = Field(description="The class.")
     comprehension: float = Field(description="Success ratio over the window.")
@@ -90,11 +90,11 @@ class Observation(Fact):
     subject = "observation"
     number = "version"
 
-    version: Count = Field(ge=1, description="One more with each observation.")
+    version: Count = Field(ge=1, description="Number of the observation, from 1.")
     capacity: CapacityView
     gaze: GazeView
-    awareness: dict[Id, AwarenessView] = Field(description="Per task that has results.")
-    warnings: Warnings = Field(default=[], description="Those of the last gaze and of the last result.")
+    awareness: dict[Id, AwarenessView] = Field(description="For each task that has results.")
+    warnings: Warnings = Field(default=[], description="The warnings of the last gaze and of the last result.")
 
 
 class GazeChunk(StreamItem):
@@ -108,8 +108,8 @@ class GazeChunk(StreamItem):
     t: Annotated[list[Seconds], Field(min_length=1)] = Field(description="Rising; seconds of the source's clock.")
     x: list[float | None] | None = Field(default=None, description="0..1 from the left; null where lost.")
     y: list[float | None] | None = Field(default=None, description="0..1 from the top; null where lost.")
-    valid: list[bool] | None = Field(default=None, description="Left out: valid wherever x and y are there.")
-    aoi: list[str | None] | None = Field(default=None, description="AOI names; null is none of them.")
+    valid: list[bool] | None = Field(default=None, description="Left out: valid wherever x and y are given.")
+    aoi: list[str | None] | None = Field(default=None, description="AOI names; null is no AOI.")
 
     @model_validator(mode="after")
     def _columns(self) -> GazeChunk:

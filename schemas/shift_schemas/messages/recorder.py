@@ -20,8 +20,12 @@ from shift_schemas.messages.base import (
 )
 from shift_schemas.timestamps import Stamp
 
-FORMAT = 2
-"""What a session records. 1: no shares of gaze, no warnings, no restarts. A session keeps its first format."""
+FORMAT = 3
+"""The format that a new session records in. A session keeps the format that it began with.
+
+1: no shares of gaze, no warnings, no restarts. 2: an estimate is published only where it changes, and a decision does
+not record what it required. 3: a configuration always publishes its estimates, and a decision records ``required``.
+"""
 
 
 class Session(Fact):
@@ -32,9 +36,9 @@ class Session(Fact):
 
     participant: Id = Field(description="Pseudonym of the participant.")
     study: Id = Field(description="The study's id.")
-    condition: Id | None = Field(default=None, description="The study's condition; none: its own values.")
-    seed: Annotated[int, Field(ge=0, lt=2**53)] = Field(description="Seed of every draw of the session.")
-    state: SessionState = Field(description="live, ending (nothing is taken any more) or ended.")
+    condition: Id | None = Field(default=None, description="The study's condition; left out: the study's own values.")
+    seed: Annotated[int, Field(ge=0, lt=2**53)] = Field(description="Seed of all random numbers of the session.")
+    state: SessionState = Field(description="live, ending (it accepts no more input) or ended.")
     started: Stamp = Field(description="When it began.")
     ended: Stamp | None = Field(default=None, description="When it ended.")
     recording: str = Field(default="", description="Name of the finished recording.")
@@ -43,8 +47,8 @@ class Session(Fact):
     replay_of: str = Field(default="", description="Name of the recording that this session replays.")
     software: str = Field(default="", description="Version of shift-mesh.")
     revision: str = Field(default="", description="Git revision of shift-mesh, where known.")
-    format: Count = Field(default=1, description="Which facts and fields the session records; today 2.")
-    warnings: Warnings = Field(default=[], description="What was accepted at its start and may not be meant.")
+    format: Count = Field(default=1, description="Which facts and fields the session records; today 3.")
+    warnings: Warnings = Field(default=[], description="What was accepted at its start but may be a mistake.")
 
 
 class Config(Fact):
@@ -54,7 +58,7 @@ class Config(Fact):
     subject = "config"
     number = "version"
 
-    version: Count = Field(ge=1, description="1 at the start, one more per change.")
+    version: Count = Field(ge=1, description="1 at the start; each change adds 1.")
     study: str = Field(description="The study in force as one JSON string.")
 
 
@@ -66,7 +70,7 @@ class Marker(Fact):
     listed_last = True
 
     marker_id: Id = Field(description="Its id.")
-    text: Text = Field(description="What was noted.")
+    text: Text = Field(description="The note.")
 
 
 START_ID, END_ID = "start", "end"

@@ -1,1 +1,1 @@
-"""The gateway: the door for REST, the live stream and the web page."""
+"""The gateway: REST, the live stream and the web page."""

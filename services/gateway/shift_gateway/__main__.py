@@ -1,10 +1,10 @@
-"""``python -m shift_gateway``: the gateway as a process. Settings are environment variables, ``SHIFT_...``."""
+"""``python -m shift_gateway``: run the gateway as a process. Its settings are environment variables, ``SHIFT_...``."""
 
 from shift_gateway.service import run_gateway
 
 
 def main() -> None:
-    """Run it."""
+    """Run the gateway."""
     run_gateway()
 
 

@@ -1,4 +1,4 @@
-"""The documentation at ``/docs``: Swagger UI from this host alone; its files come with the package fastapi-offline."""
+"""The documentation at ``/docs``: Swagger UI. The package fastapi-offline has its files, so it needs no other host."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HTML = """<!doctype html>
 <title>SHIFT mesh: all paths</title>
 <link rel="icon" href="/favicon.ico"><link rel="stylesheet" href="/docs/swagger-ui.css">
 <div id="swagger-ui"></div>
-<noscript>This page needs JavaScript; the same as a document: <a href="/openapi.json">/openapi.json</a></noscript>
+<noscript>This page needs JavaScript. The same document without it: <a href="/openapi.json">/openapi.json</a></noscript>
 <script src="/docs/swagger-ui-bundle.js"></script><script src="/docs/start.js"></script>
 </html>
 """
@@ -33,7 +33,7 @@ ICON = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32">
 
 
 def static_folder() -> Path:
-    """Return the folder with Swagger UI's files; the package itself is not imported."""
+    """Return the folder with Swagger UI's files, without importing the package."""
     spec = importlib.util.find_spec("fastapi_offline")
     assert spec is not None
     assert spec.submodule_search_locations

@@ -1,4 +1,4 @@
-"""ASGI middleware in front of everything: hosts and origins, CORS for named origins, and security headers."""
+"""ASGI middleware around the whole application: hosts and origins, CORS for named origins, and security headers."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from shift_schemas.errors import ShiftError
 from starlette.middleware.cors import CORSMiddleware
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from shift_gateway.origins import Asked, Rules
+from shift_gateway.origins import RequestOrigin, Rules
 from shift_gateway.problems import problem_response
 
 CORS_METHODS = ("GET", "HEAD", "POST", "PATCH", "OPTIONS")
 CORS_HEADERS = ("Authorization", "Cache-Control", "Content-Type", "Last-Event-ID", "Range")
 EXPOSED_HEADERS = ("Allow", "Content-Disposition", "Content-Range", "Retry-After")
 MAX_AGE_S = 600
-"""How long a browser may remember a preflight's answer; Chromium keeps none longer than two hours."""
+"""How long a browser may remember the answer to a preflight, seconds. Chromium remembers it for 2 hours at most."""
 SECURITY_HEADERS = (
     (b"x-content-type-options", b"nosniff"),
-    (b"referrer-policy", b"same-origin"),  # not no-referrer: with it, forms of the own page have the origin null
+    (b"referrer-policy", b"same-origin"),  # with no-referrer, forms of our own page would have the origin null
     (b"cross-origin-resource-policy", b"same-origin"),
 )
 NO_PAGE = (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'")
-"""For what is not a page of ours; a page brings its own policy."""
+"""The policy of every answer that is not one of our pages; a page has its own."""
 
 
 class Guard:
-    """Let through what :class:`Rules` allow; answer the rest with a problem document."""
+    """Pass on the requests that :class:`Rules` allow; answer the others with a problem document."""
 
     def __init__(self, app: ASGIApp, rules: Rules) -> None:
         self._app = app
@@ -42,7 +42,7 @@ class Guard:
         if scope["type"] == "http":
             send = self._secured(send)
         try:
-            named = self._rules.check(_asked(scope))
+            named = self._rules.check(_origin_of(scope))
         except ShiftError as e:
             await _refuse(e, scope, receive, send)
             return
@@ -61,7 +61,7 @@ class Guard:
         return secured
 
 
-def _asked(scope: Scope) -> Asked:
+def _origin_of(scope: Scope) -> RequestOrigin:
     hosts: list[str] = []
     origins: list[str] = []
     site = mode = ""
@@ -75,11 +75,11 @@ def _asked(scope: Scope) -> Asked:
         elif name == b"sec-fetch-mode":
             mode = value.decode("latin-1")
     server = (scope.get("server") or ("",))[0]
-    return Asked(scope.get("method", "GET"), tuple(hosts), tuple(origins), site, mode, server)
+    return RequestOrigin(scope.get("method", "GET"), tuple(hosts), tuple(origins), site, mode, server)
 
 
 async def _refuse(error: ShiftError, scope: Scope, receive: Receive, send: Send) -> None:
-    """Answer with the error; a WebSocket's handshake by an HTTP answer where the server can."""
+    """Answer with the error. A WebSocket's handshake gets an HTTP answer if the server supports it."""
     response = problem_response(error)
     if scope["type"] == "http":
         await response(scope, receive, send)

@@ -1,9 +1,9 @@
-"""uvicorn's HTTP/1.1 protocol, where an offer to go over to HTTP/2 does not lose the request's body.
+"""uvicorn's HTTP/1.1 protocol, in which an offer to change to HTTP/2 does not lose the request's body.
 
-Java's standard client and ``curl --http2`` send ``Upgrade: h2c`` with their first request and go on in HTTP/1.1 where
-the server does not take the offer (RFC 9110, 7.8). httptools takes each upgrade for one that happens: what follows the
-headers is then another protocol for it, and the body is lost. Such a request is parsed once more without the offer.
-Upgrades to WebSocket stay what they are.
+Java's standard client and ``curl --http2`` send ``Upgrade: h2c`` with their first request, and continue in HTTP/1.1 if
+the server ignores the offer (RFC 9110, 7.8). httptools assumes that every offered upgrade happens: it takes the bytes
+after the headers for another protocol, and the body is lost. Such a request is parsed again without the offer.
+Upgrades to WebSocket are not affected.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _OFFERED = (b"upgrade", b"http2-settings")
 
 
 class _Parser(httptools.HttpRequestParser):
-    """A parser that hands an upgrade which is not to WebSocket back to the protocol."""
+    """A parser that returns an upgrade to the protocol, unless it is an upgrade to WebSocket."""
 
     def __init__(self, protocol: GatewayProtocol) -> None:
         super().__init__(protocol)
@@ -50,22 +50,22 @@ class GatewayProtocol(HttpToolsProtocol):
         self.parser = self._new_parser()
 
     def takes_upgrade(self) -> bool:
-        """Whether the request at hand becomes a WebSocket."""
+        """Return whether the current request becomes a WebSocket."""
         return self._should_upgrade()
 
     def parse_again(self, rest: bytes) -> None:
-        """Parse the request at hand as if it had not offered an upgrade; ``rest`` follows its headers."""
+        """Parse the current request as if it had not offered an upgrade; ``rest`` follows its headers."""
         head = self._head_without_offer()
         self.parser = self._new_parser()
         self.parser.feed_data(head + rest)
 
     def on_headers_complete(self) -> None:
-        """Start the request, but not one that is parsed again."""
+        """Start the request, unless it is parsed again."""
         if not self._offers():
             super().on_headers_complete()
 
     def on_message_complete(self) -> None:
-        """End the request's body, but not of one that is parsed again."""
+        """End the request's body, unless it is parsed again."""
         if not self._offers():
             super().on_message_complete()
 
@@ -74,7 +74,7 @@ class GatewayProtocol(HttpToolsProtocol):
 
     def _new_parser(self) -> _Parser:
         parser = _Parser(self)
-        parser.set_dangerous_leniencies(lenient_data_after_close=True)  # as uvicorn's own
+        parser.set_dangerous_leniencies(lenient_data_after_close=True)  # as uvicorn's own parser
         return parser
 
     def _head_without_offer(self) -> bytes:

@@ -1,12 +1,13 @@
-"""Which hosts and origins the gateway answers. Pure.
+"""The hosts and origins that the gateway answers. Pure.
 
 A browser sends requests for any web page that is open in it, also to 127.0.0.1. Two headers, which a page cannot forge,
-tell these requests from the lab's own:
+distinguish these requests from the lab's own:
 
 - ``Host``: the name in the address. A name that an attacker points at this machine (DNS rebinding) is a foreign one.
-- ``Origin``: the page that asks. Browsers leave it out of some requests that only fetch; then ``Sec-Fetch-Site`` tells.
+- ``Origin``: the page that asks. Browsers leave it out of some requests that only read; ``Sec-Fetch-Site`` then tells
+  where the request comes from.
 
-Programs that are not browsers send no ``Origin`` and are taken as they are.
+Programs that are not browsers send no ``Origin``, and are accepted.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _READS = ("GET", "HEAD")
 
 
 class WrongHost(ShiftError):
-    """The request is for a host that this gateway is not."""
+    """The request names a host that is not this gateway."""
 
     kind = "wrong-host"
     status = 421
@@ -41,8 +42,8 @@ class ForeignOrigin(ShiftError):
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """What a request says about where it goes and where it comes from, as its headers have it."""
+class RequestOrigin:
+    """Where a request goes and where it comes from, according to its headers."""
 
     method: str
     hosts: tuple[str, ...] = ()
@@ -50,12 +51,12 @@ class Asked:
     fetch_site: str = ""
     fetch_mode: str = ""
     server: str = ""
-    """The address of this machine that the connection came in at."""
+    """The address of this machine that received the connection."""
 
 
 @lru_cache(256)
 def host_and_port(text: str) -> tuple[str, int | None]:
-    """Return name and port of a ``Host`` header; ``("", None)`` where it is not one.
+    """Return name and port of a ``Host`` header; ``("", None)`` if it is not one.
 
     The name is in lower case, without a trailing dot, and an IPv6 address is in its short form without brackets.
     """
@@ -77,7 +78,7 @@ def _name(text: str) -> str:
 
 @lru_cache(256)
 def is_loopback(name: str) -> bool:
-    """Whether a name or address means this machine, whatever a name server says."""
+    """Return whether a name or address means this machine, whatever a name server says."""
     if name == "localhost" or name.endswith(".localhost"):
         return True
     try:
@@ -88,7 +89,7 @@ def is_loopback(name: str) -> bool:
 
 @lru_cache(256)
 def origin_parts(text: str) -> tuple[str, str, int | None] | None:
-    """Return scheme, name and port of an origin; None where it is not one, as ``null`` is not."""
+    """Return scheme, name and port of an origin; None if it is not one, as ``null`` is not."""
     scheme, separator, rest = text.strip().partition("://")
     name, port = host_and_port(rest)
     if not separator or not name or not re.fullmatch(r"[a-zA-Z][a-zA-Z0-9+.-]*", scheme):
@@ -97,7 +98,7 @@ def origin_parts(text: str) -> tuple[str, str, int | None] | None:
 
 
 def host_names(given: object) -> tuple[str, ...]:
-    """Return the names of ``SHIFT_HOSTS``, comma separated. Raise ValueError where one is not a host name."""
+    """Return the names of ``SHIFT_HOSTS``, comma separated. Raise ValueError if one is not a host name."""
     names = []
     for text in _listed(given):
         name, _ = host_and_port(text)
@@ -108,7 +109,7 @@ def host_names(given: object) -> tuple[str, ...]:
 
 
 def origin_names(given: object) -> tuple[str, ...]:
-    """Return the origins of ``SHIFT_ORIGINS``, comma separated. Raise ValueError where one is not an origin."""
+    """Return the origins of ``SHIFT_ORIGINS``, comma separated. Raise ValueError if one is not an origin."""
     names = []
     for text in _listed(given):
         parts = origin_parts(text.removesuffix("/"))
@@ -122,7 +123,7 @@ def origin_names(given: object) -> tuple[str, ...]:
 
 
 def _spelled(scheme: str, name: str, port: int | None) -> str:
-    """The origin as browsers write it."""
+    """Return the origin as browsers write it."""
     host = f"[{name}]" if ":" in name else name
     return f"{scheme}://{host}" + ("" if port in (None, PORTS.get(scheme)) else f":{port}")
 
@@ -135,21 +136,21 @@ def _listed(given: object) -> Iterable[str]:
 
 @dataclass(frozen=True)
 class Rules:
-    """What this gateway answers: its own ``host``, further ``hosts``, and ``origins`` of pages elsewhere."""
+    """The requests that this gateway answers: its own ``host``, further ``hosts``, and ``origins`` of other pages."""
 
     host: str
     hosts: tuple[str, ...] = ()
     origins: tuple[str, ...] = ()
 
-    def check(self, asked: Asked) -> str | None:
-        """Return the named foreign origin that asks; None for a program or a page of the gateway's own.
+    def check(self, asked: RequestOrigin) -> str | None:
+        """Return the named foreign origin that asks; None for a program or one of the gateway's own pages.
 
         Raises
         ------
         WrongHost
             The request is for another host.
         ForeignOrigin
-            It comes from a web page that is neither the gateway's own nor named.
+            It comes from a web page that is neither one of the gateway's own nor named.
         """
         host = self._checked_host(asked)
         if asked.origins:
@@ -160,8 +161,8 @@ class Rules:
             raise ForeignOrigin(f"{said}; ask from a program, or with fetch() from an origin that SHIFT_ORIGINS names")
         return None
 
-    def _checked_host(self, asked: Asked) -> str:
-        """Return the host, which may be missing (HTTP/1.0): a browser always sends one."""
+    def _checked_host(self, asked: RequestOrigin) -> str:
+        """Return the host. HTTP/1.0 may leave it out; a browser always sends it."""
         if not asked.hosts:
             return ""
         if len(asked.hosts) > 1:
@@ -177,7 +178,7 @@ class Rules:
         listens = () if self.host in ("0.0.0.0", "::", "") or is_loopback(self.host) else (self.host,)
         return ("localhost", "127.0.0.1", "[::1]", *listens, *self.hosts)
 
-    def _checked_origin(self, asked: Asked, host: str) -> str | None:
+    def _checked_origin(self, asked: RequestOrigin, host: str) -> str | None:
         origin = asked.origins[0]
         parts = origin_parts(origin)
         if len(asked.origins) == 1 and parts is not None:
@@ -196,7 +197,7 @@ def _with_port(host: str, scheme: str) -> tuple[str, int | None]:
 
 def _foreign(origin: str, parts: tuple[str, str, int | None] | None) -> str:
     if parts is None:
-        said = f"Origin {shorten(origin)!r} is the name of no page (a page opened as a file has 'null')"
+        said = f"Origin {shorten(origin)!r} does not name a page (a page opened as a file has 'null')"
         remedy = "serve the page from a web server, for example with python -m http.server"
         return f"{said}; {remedy}, and start the gateway with its origin in SHIFT_ORIGINS"
     spelled = shorten(_spelled(*parts))

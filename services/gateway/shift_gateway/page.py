@@ -1,4 +1,4 @@
-"""The page at ``/``: what runs, and how to start. It asks ``/readyz`` and ``/v1/sessions``; no library."""
+"""The page at ``/``: the services, the sessions, and how to start. It asks ``/readyz`` and ``/v1/sessions``."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ refresh();
 
 
 def _policy(page: str) -> str:
-    """The content security policy of a page: its one script by its hash, and nothing of another host."""
+    """Return the content security policy of a page: its one script by its hash, and nothing from another host."""
     script = page.split("<script>")[1].split("</script>")[0]
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return (

@@ -1,4 +1,4 @@
-"""What every path does beside its own work: HEAD, OPTIONS, and answers for paths and methods that are not there."""
+"""The behaviour of every path: HEAD, OPTIONS, and answers for unknown paths and methods."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LIST = "the list of paths is at /docs, and as a document at /openapi.json"
 
 
 class GatewayRoute(APIRoute):
-    """A path that answers HEAD wherever it answers GET. FastAPI's own answers 405."""
+    """A path that answers HEAD wherever it answers GET. FastAPI's own route answers 405."""
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
         """Match HEAD as GET."""
@@ -29,7 +29,7 @@ class GatewayRoute(APIRoute):
         return (Match.FULL if match == Match.PARTIAL and self._reads_only(scope) else match), child
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer; the server leaves the body of an answer to HEAD out."""
+        """Answer. The server leaves out the body of an answer to HEAD."""
         if self._reads_only(scope):
             await self.app(scope, receive, send)
         else:
@@ -49,7 +49,7 @@ class GatewayApp(FastAPI):
         self.add_exception_handler(HTTPException, _on_http_error)
 
     def build_middleware_stack(self) -> ASGIApp:
-        """Build it, as FastAPI does, within the guard."""
+        """Return FastAPI's stack within the guard."""
         return Guard(super().build_middleware_stack(), self._rules)
 
 
@@ -76,7 +76,7 @@ def allowed_methods(routes: Iterable[BaseRoute], scope: Scope) -> list[str]:
 
 
 def proposal(routes: Iterable[BaseRoute], path: str) -> str:
-    """Return what may have been meant: the same without a slash too many, or in lower case; else nothing."""
+    """Return what may have been meant: the path without a slash too many, or in lower case; else an empty text."""
     if "//" in path.rstrip("/"):
         return "it has two slashes in a row; is an id missing between them?"
     meant = path.rstrip("/")

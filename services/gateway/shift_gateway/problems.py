@@ -39,11 +39,11 @@ PROBLEM_RESPONSE: dict[str, Any] = {
         }
     },
 }
-"""What every path of the OpenAPI document answers where it does not do what it is asked."""
+"""The answer of every path in the OpenAPI document to a request that it refuses."""
 
 
 def problem_body(error: ShiftError) -> dict[str, Any]:
-    """The problem document of an error."""
+    """Return the problem document of an error."""
     return {
         "type": f"urn:shift:problem:{error.kind}",
         "title": error.title,
@@ -54,13 +54,13 @@ def problem_body(error: ShiftError) -> dict[str, Any]:
 
 
 def problem_response(error: ShiftError) -> JSONResponse:
-    """The response of an error."""
+    """Return the response to a request that failed with the error."""
     headers = {"Retry-After": "1"} if error.status == HTTPStatus.SERVICE_UNAVAILABLE else None
     return JSONResponse(problem_body(error), error.status, headers=headers, media_type=MEDIA_TYPE)
 
 
 def only(name: str, values: list[str]) -> str:
-    """Return the one value of a query parameter. Raise :class:`MalformedMessage` where it is missing or repeated."""
+    """Return the one value of a query parameter. Raise :class:`MalformedMessage` if it is missing or repeated."""
     if len(values) == 1:
         return values[0]
     rule = f"it is given {len(values)} times; give it once"
@@ -70,7 +70,7 @@ def only(name: str, values: list[str]) -> str:
 
 
 def check_size(size: int) -> None:
-    """Raise :class:`TooLarge` where a body or a WebSocket's message is above the limit, in bytes."""
+    """Raise :class:`TooLarge` if a body or a WebSocket's message is above the limit; ``size`` is in bytes."""
     if size > BODY_LIMIT:
         raise TooLarge(f"the body is above {BODY_LIMIT // 1024} KB; send gaze in smaller chunks")
 
@@ -97,16 +97,16 @@ def parse_body(raw: bytes | str, kind: type[M], query: Iterable[tuple[str, str]]
 
 
 class BodyLimit:
-    """ASGI middleware: a body above the limit is refused when it is read, also one in pieces without a length.
+    """ASGI middleware that refuses a body above the limit when it is read, even one in pieces without a length.
 
-    Raised from ``receive``, so that nothing is done with a part of it, and ids and session are looked at before.
+    The error is raised from ``receive``: no part of the body is used, and ids and session are checked before it.
     """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Count what is received."""
+        """Count the bytes that are received."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return

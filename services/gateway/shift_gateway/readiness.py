@@ -1,4 +1,4 @@
-"""Whether the mesh is ready: each service, and each pair of a reader and the owner that it reads. Pure."""
+"""The readiness of the mesh: of each service, and of each pair of a reader and the owner that it reads. Pure."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ SILENT = "does not answer"
 
 
 def readiness(answers: Mapping[str, Health | None], gateway: Health) -> dict[str, Any]:
-    """Return what ``/readyz`` says.
+    """Return the answer of ``/readyz``.
 
-    ``missing`` names the services at fault. A service whose one complaint is that it does not reach another one, which
-    answers nobody, is not at fault itself; ``links`` names each such pair all the same.
+    ``missing`` names the services at fault. A service is not at fault if it only does not reach another one that
+    answers nobody; ``links`` still names each such pair.
     """
     silent = {service for service, health in answers.items() if health is None}
     every: dict[str, Health | None] = {**answers, gateway.service: gateway}

@@ -1,8 +1,8 @@
-"""What is wrong with a body that is not JSON, in a sentence for each kind of client. Pure.
+"""The error for a body that is not a JSON object, with a sentence for each kind of client. Pure.
 
-The content type does not decide: ``curl -d`` says that JSON is a form, and web pages are kept out by their origin. A
-body in UTF-8 that is a JSON object is taken, whatever it is called. A compressed body is refused: a chunk of gaze is
-small, so that compression gains nothing on a lab's network, and unpacking would have to be bounded against bombs.
+The content type does not matter: ``curl -d`` declares JSON as a form, and the origin keeps foreign web pages out. Any
+body in UTF-8 that is a JSON object is accepted. A compressed body is refused: a chunk of gaze is small, so compression
+gains nothing on a lab's network, and unpacking would need a limit against decompression bombs.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, short
 BOM = b"\xef\xbb\xbf"
 _FORM = re.compile(r"[\w.%+\[\]-]+=[^\s{}]*(&[\w.%+\[\]-]+=[^\s{}]*)*")
 _LOOKED_AT = 4096
-"""How much of a body that is not JSON is looked at."""
+"""How many characters of a body that is not JSON are examined."""
 
 
 class UnsupportedEncoding(ShiftError):
@@ -25,23 +25,23 @@ class UnsupportedEncoding(ShiftError):
 
     kind = "unsupported-encoding"
     status = 415
-    title = "The body's content encoding is not taken"
+    title = "The body's content encoding is not supported"
 
 
 def check_encoding(encoding: str) -> None:
-    """Raise :class:`UnsupportedEncoding` where a ``Content-Encoding`` says that the body is compressed."""
+    """Raise :class:`UnsupportedEncoding` if a ``Content-Encoding`` says that the body is compressed."""
     if encoding.strip().lower() not in ("", "identity"):
         said = f"the body is compressed (Content-Encoding: {shorten(encoding)})"
         raise UnsupportedEncoding(f"{said}; send it as it is, in chunks of at most 256 KB")
 
 
 def without_mark(raw: bytes | str) -> bytes | str:
-    """Return the body without a byte order mark of UTF-8, which C# and PowerShell put in front."""
+    """Return the body without the byte order mark that C# and PowerShell put before UTF-8."""
     return raw.removeprefix("\ufeff") if isinstance(raw, str) else raw.removeprefix(BOM)
 
 
 def not_json(raw: bytes | str, query: Iterable[tuple[str, str]] = ()) -> MalformedMessage:
-    """Return the error for a body that is not JSON. ``query`` is what the address has after its question mark."""
+    """Return the error for a body that is not JSON. ``query`` is the part of the address after its question mark."""
     return _refused(f"the body must be JSON: {_why(raw, list(query))}")
 
 

@@ -1,4 +1,4 @@
-"""The gateway as a process: uvicorn around the application, on the Zenoh bus."""
+"""The gateway as a process: uvicorn with the application, on the Zenoh bus."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from shift_gateway.settings import GatewaySettings
 
 log = structlog.get_logger()
 GRACE_S = 3
-"""How long open streams may go on after the stop signal."""
+"""How long open streams may continue after the stop signal, seconds."""
 
 
 def run_gateway() -> None:
-    """Serve until SIGINT or SIGTERM."""
+    """Run the server until SIGINT or SIGTERM. Exit with 2 if a setting is wrong."""
     try:
         settings = read_settings(GatewaySettings)
         assert isinstance(settings, GatewaySettings)
@@ -39,7 +39,7 @@ def run_gateway() -> None:
 
     app = make_app(settings, open_bus, SystemClock())
     log.info("started", url=f"http://{settings.host}:{settings.port}", router=settings.zenoh)
-    for number in (signal.SIGINT, signal.SIGTERM):  # uvicorn raises the signal again when it is done: exit with 0
+    for number in (signal.SIGINT, signal.SIGTERM):  # uvicorn raises the signal again at its end; exit with 0
         signal.signal(number, lambda *_: None)
     uvicorn.run(
         app, host=settings.host, port=settings.port, log_level="warning", access_log=False,

@@ -13,16 +13,16 @@ from shift_study.loading import study_data
 
 
 def add_studies(app: FastAPI, folder: Path) -> None:
-    """Add the paths; ``folder`` holds the study files. They are read anew each time, in a thread."""
+    """Add the paths. ``folder`` contains the study files; each request reads them, in a thread."""
 
     @app.get("/v1/studies", tags=["studies"])
     async def studies() -> dict[str, Any]:
-        """Every study by its name, with its mistakes and warnings, one sentence each."""
+        """Return every study by its name, with its mistakes and warnings, one sentence each."""
         return {"studies": [_summary(found) for found in await asyncio.to_thread(list_studies, folder)]}
 
     @app.get("/v1/studies/{name}", tags=["studies"])
     async def study(name: str) -> dict[str, Any]:
-        """One study, every default written out; a study with mistakes is answered with them."""
+        """Return one study, every default written out; the answer to a study with mistakes names them."""
         found = await asyncio.to_thread(find_study, name, folder)
         if found is None:
             rule = await asyncio.to_thread(unknown_study, name, folder)
