@@ -1,4 +1,4 @@
-"""The recorder's core: the session's start, end, configuration and markers, as a fold."""
+"""The recorder's core: start, end, configuration and markers of a session."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ STUDY: dict[str, Any] = {"study": "mine", "conditions": {"control": {"learner": 
 
 
 def start(**given: Any) -> StartSession:
-    """A start, its study resolved as the shell does it."""
+    """Return a start whose study was found, as by the shell."""
     return StartSession(**{"command_id": "start", "session": "s1", "participant": "P01", "study": STUDY, **given})
 
 
 def begun(**given: Any) -> RecorderState:
-    """A session that has begun."""
+    """Return the state of a session that has started."""
     return core.step(None, start(**given), NOW).state
 
 
 def configure(state: RecorderState, patch: dict[str, Any]) -> Step[RecorderState]:
-    """One change."""
+    """Return the result of one change."""
     return core.step(state, Configure(command_id="c1", session="s1", patch=patch), LATER)
 
 
 def finish(**given: Any) -> FinishSession:
-    """The recording is finished."""
+    """Return the second half of an end."""
     done = {"recording": "s1.mcap", "sha256": "ab" * 32, "counts": {"decision": 3}}
     return FinishSession(**{"command_id": "end", "session": "s1", **done, **given})
 
@@ -48,7 +48,7 @@ END = EndSession(command_id="end", session="s1")
 # --- start ---
 
 
-def test_a_start_puts_out_the_session_and_its_configuration() -> None:
+def test_start_publishes_the_session_and_its_configuration() -> None:
     step = core.step(None, start(seed=7, condition="control", software="1.0", revision="abc"), NOW)
     session, config = step.facts
     assert isinstance(session, Session)
@@ -61,28 +61,28 @@ def test_a_start_puts_out_the_session_and_its_configuration() -> None:
     assert step.result.keys() >= {"session", "participant", "study", "condition", "seed", "state", "started"}
 
 
-def test_the_study_in_force_is_that_of_the_condition_and_the_original_is_kept() -> None:
+def test_study_in_force_follows_the_condition_and_the_original_is_kept() -> None:
     state = begun(condition="control")
     assert study_from_json(state.config.study).learner.name == "scoring"
     assert study_of(json.loads(state.original)).learner.name == "q-learning"
     assert study_from_json(begun().config.study).learner.name == "q-learning"
 
 
-def test_a_recorded_start_with_an_area_that_is_refused_today_is_derived_again() -> None:
+def test_recorded_start_with_an_area_that_is_refused_today_is_derived_again() -> None:
     flat = {"name": "cup", "polygon": [[0.2, 0.2], [0.5, 0.5], [0.8, 0.8]]}
     state = begun(study={"study": "old", "aois": [flat]}, condition=None)
     assert study_from_json(state.config.study).aoi_names == ("cup",)
     assert configure(state, {"reward": {"decay": 0.2}}).state.config.version == 2
 
 
-def test_a_seed_that_is_left_out_is_made_from_the_session_s_id() -> None:
+def test_missing_seed_is_made_from_the_session_id() -> None:
     assert begun().fact.seed == int.from_bytes(hashlib.sha256(b"s1").digest()[:6], "big")
     assert begun(session="s2").fact.seed != begun().fact.seed
     assert begun(seed=0).fact.seed == 0, "0 is a seed"
     assert begun().fact.seed < 2**53, "any JSON reader keeps its digits"
 
 
-def test_a_session_that_is_there_is_not_begun_again() -> None:
+def test_existing_session_is_not_started_again() -> None:
     with pytest.raises(Conflict, match="is there already"):
         core.step(begun(), start(participant="P02"), NOW)
 
@@ -93,7 +93,7 @@ def test_a_session_that_is_there_is_not_begun_again() -> None:
      ({"study": STUDY | {"reward": {"decay": -1}}}, "reward.decay")],
     ids=str,
 )  # fmt: skip
-def test_a_study_with_a_mistake_begins_nothing(given: dict[str, Any], says: str) -> None:
+def test_invalid_study_starts_nothing(given: dict[str, Any], says: str) -> None:
     with pytest.raises(InvalidStudy, match=says):
         core.step(None, start(**given), NOW)
 
@@ -101,7 +101,7 @@ def test_a_study_with_a_mistake_begins_nothing(given: dict[str, Any], says: str)
 # --- configure ---
 
 
-def test_a_change_is_a_version_more_and_holds_on_top_of_the_last() -> None:
+def test_change_increments_the_version_and_builds_on_the_last_one() -> None:
     first = configure(begun(), {"reward": {"scale": 2.0}})
     second = configure(first.state, {"reward": {"decay": 0.2}})
     (fact,) = second.facts
@@ -112,7 +112,7 @@ def test_a_change_is_a_version_more_and_holds_on_top_of_the_last() -> None:
     assert second.result["version"] == 3
 
 
-def test_what_is_fixed_is_refused_by_name() -> None:
+def test_change_of_a_fixed_setting_is_refused_by_name() -> None:
     with pytest.raises(MalformedMessage) as refused:
         configure(begun(), {"tasks": ["a"], "learner": {"name": "scoring"}, "reward": {"scale": 2}})
     assert [e.field for e in refused.value.errors] == ["tasks", "learner.name"]
@@ -122,7 +122,7 @@ def test_what_is_fixed_is_refused_by_name() -> None:
 @pytest.mark.parametrize(
     "patch", [{"reward": {"decay": "fast"}}, {"rewrad": {}}, {"study": None}, {"version": 1}], ids=str
 )
-def test_a_change_to_nonsense_is_refused(patch: dict[str, Any]) -> None:
+def test_invalid_change_is_refused(patch: dict[str, Any]) -> None:
     with pytest.raises(InvalidStudy):
         configure(begun(), patch)
 
@@ -130,7 +130,7 @@ def test_a_change_to_nonsense_is_refused(patch: dict[str, Any]) -> None:
 # --- mark ---
 
 
-def test_a_marker_is_a_fact_with_its_id() -> None:
+def test_marker_is_a_fact_with_its_id() -> None:
     step = core.step(begun(), Mark(command_id="m1", session="s1", text="laughs ☺"), LATER)
     (fact,) = step.facts
     assert isinstance(fact, Marker)
@@ -141,7 +141,7 @@ def test_a_marker_is_a_fact_with_its_id() -> None:
 # --- end ---
 
 
-def test_an_end_comes_in_two_halves() -> None:
+def test_end_has_two_halves() -> None:
     ending = core.step(begun(), END, LATER)
     (first,) = ending.facts
     assert isinstance(first, Session)
@@ -155,30 +155,30 @@ def test_an_end_comes_in_two_halves() -> None:
     }  # fmt: skip
 
 
-def test_an_end_that_is_asked_again_while_it_goes_on_puts_nothing_out() -> None:
+def test_repeated_end_publishes_nothing_while_the_first_is_under_way() -> None:
     ending = core.step(begun(), END, NOW)
     assert core.step(ending.state, END, LATER) == Step(ending.state)
 
 
-def test_the_second_half_is_a_repeat_of_the_first() -> None:
+def test_second_half_is_a_repeat_of_the_first() -> None:
     assert finish().content() == END.content(), "so that the same end again gets its result"
     assert finish().procedure == "end_session"
 
 
-def test_every_attempt_to_finish_says_the_same_time_of_the_end() -> None:
+def test_every_attempt_to_finish_gives_the_same_end_time() -> None:
     ending = core.step(begun(), END, NOW).state
     within, outside = core.ended(ending), core.step(ending, finish(), LATER).facts[0]
     assert isinstance(outside, Session)
     assert within.ended == outside.ended == within.stamp == outside.stamp == NOW
 
 
-def test_the_session_within_its_own_recording_has_no_checksum() -> None:
+def test_session_within_its_own_recording_has_no_checksum() -> None:
     within = core.ended(core.step(begun(), END, NOW).state)
     assert (within.state, within.recording, within.sha256) == ("ended", "s1.mcap", "")
 
 
 @pytest.mark.parametrize("half", [[END], [END, finish()]], ids=["ending", "ended"])
-def test_nothing_is_taken_once_it_ends(half: list[Command]) -> None:
+def test_ending_session_accepts_no_commands(half: list[Command]) -> None:
     state = begun()
     for command in half:
         state = core.step(state, command, NOW).state
@@ -190,7 +190,7 @@ def test_nothing_is_taken_once_it_ends(half: list[Command]) -> None:
             core.step(state, command, LATER)
 
 
-def test_without_a_session_everything_but_its_start_is_unknown() -> None:
+def test_unknown_session_refuses_everything_but_its_start() -> None:
     for command in (
         END,
         Mark(command_id="m1", session="s1", text=""),
@@ -213,7 +213,7 @@ commands = st.one_of(
 
 @settings(deadline=None)
 @given(st.lists(commands, max_size=12), st.integers(0, 12))
-def test_a_restart_at_any_point_changes_nothing(given_commands: list[Command], at: int) -> None:
+def test_restart_at_any_point_changes_nothing(given_commands: list[Command], at: int) -> None:
     living = restarted = begun(seed=1, condition="control")
     for i, command in enumerate(given_commands):
         if i == at % len(given_commands):

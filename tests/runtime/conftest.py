@@ -1,4 +1,4 @@
-"""A router of its own for the buses of a test, and buses of both kinds."""
+"""Fixtures of the runtime: a Zenoh router, and buses of both kinds."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def anyio_backend() -> str:
 
 @pytest.fixture(scope="session")
 def router() -> Iterator[str]:
-    """The endpoint of a Zenoh router in this process."""
+    """Start a Zenoh router in this process and return its endpoint."""
     endpoint = free_endpoint()
     session = zenoh.open(zenoh_config("router", listen=endpoint))
     yield endpoint
@@ -32,7 +32,7 @@ def router() -> Iterator[str]:
 
 @pytest.fixture(params=["memory", "zenoh"])
 async def open_bus(request: pytest.FixtureRequest) -> AsyncIterator[OpenBus]:
-    """Opens participants of one mesh; they are closed after the test."""
+    """Return a function that opens buses of one mesh; they are closed after the test."""
     buses: list[Bus] = []
     hub = Hub()
 

@@ -1,4 +1,4 @@
-"""Each owner is there once: another mesh on the router is told apart from a service's own former life."""
+"""The claim: each owner exists once, and another mesh is told apart from an earlier process of the same one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ KEY = "shift/v1/@service/monitor/health"
 
 
 def monitor(hub: Hub, mesh: str, since_s: int) -> Claim:
-    """A monitor that answers."""
+    """Return the claim of a monitor that answers."""
     bus = MemoryBus(hub)
     health = Health(service="monitor", ready=True, mesh=mesh, since=Stamp(sec=since_s, nsec=0), data=f"/{mesh}")
     bus.serve(KEY, lambda request: request.reply(encode(health)))
@@ -27,7 +27,7 @@ def monitor(hub: Hub, mesh: str, since_s: int) -> Claim:
 
 
 async def kept(claim: Claim) -> str:
-    """What comes of looking again for a while."""
+    """Return the outcome of keeping a claim for a while: the refusal, the warning or nothing."""
     try:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(claim.keep(), 0.2)
@@ -36,25 +36,25 @@ async def kept(claim: Claim) -> str:
     return claim.conflict
 
 
-async def test_where_nobody_answers_a_claim_is_made() -> None:
+async def test_claim_succeeds_when_nobody_answers() -> None:
     await Claim(MemoryBus(Hub()), "monitor", "a", Stamp(sec=1, nsec=0)).make()
 
 
-async def test_another_mesh_is_named_with_its_folder_and_what_to_do() -> None:
+async def test_other_mesh_is_refused_with_its_folder_and_the_remedy() -> None:
     hub = Hub()
     monitor(hub, "a", 1)
     with pytest.raises(OwnedElsewhere, match="another monitor answers on this router already, with the data folder /a"):
         await Claim(MemoryBus(hub), "monitor", "b", Stamp(sec=2, nsec=0)).make()
 
 
-async def test_a_former_life_of_the_same_folder_is_no_other_mesh() -> None:
+async def test_earlier_process_of_the_same_folder_is_the_same_mesh() -> None:
     hub = Hub()
     monitor(hub, "a", 1)
     await Claim(MemoryBus(hub), "monitor", "a", Stamp(sec=2, nsec=0)).make()
 
 
 @pytest.mark.parametrize(("first_s", "second_s"), [(1, 2), (5, 5)])
-async def test_of_two_that_meet_later_the_later_one_yields_and_the_other_says_so(
+async def test_later_of_two_meshes_yields_and_the_earlier_one_reports_it(
     monkeypatch: pytest.MonkeyPatch, first_s: int, second_s: int
 ) -> None:
     monkeypatch.setattr(module, "LOOK_AGAIN_S", (0.01,))
@@ -64,7 +64,7 @@ async def test_of_two_that_meet_later_the_later_one_yields_and_the_other_says_so
     assert "another monitor answers on this router already" in await kept(second)
 
 
-def test_a_folder_keeps_its_id(tmp_path: Path) -> None:
+def test_folder_keeps_its_id(tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     first = mesh_id(tmp_path)
     assert mesh_id(tmp_path) == first

@@ -1,4 +1,4 @@
-"""The journal: everything of a commit or nothing, pages of the outbox, reopening, kill -9, a full disk."""
+"""The journal: whole commits, pages of the outbox, reopening, kill -9, and a full disk."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def opened(path: Path) -> Journal:
 
 
 def filled(path: Path, **rows: int) -> Journal:
-    """A journal with that many facts in each session."""
+    """Return a journal with so many facts in each session."""
     journal = opened(path)
     for session, count in rows.items():
         journal.commit(
@@ -47,7 +47,7 @@ def seen(page: OutboxPage) -> list[tuple[str, int]]:
 # --- a commit ---
 
 
-def test_what_a_commit_held_is_there_after_reopening(path: Path) -> None:
+def test_committed_batch_is_there_after_reopening(path: Path) -> None:
     journal = opened(path)
     answer = StoredAnswer('{"task":"one"}', '{"session": "s1"}')
     journal.commit(
@@ -62,14 +62,14 @@ def test_what_a_commit_held_is_there_after_reopening(path: Path) -> None:
         assert there.answer(("s1", "start_session", "other")) is None
 
 
-def test_the_log_has_its_full_length_from_the_start_and_the_file_stays_small(path: Path) -> None:
+def test_log_has_its_full_length_from_the_start_and_the_file_stays_small(path: Path) -> None:
     journal = filled(path, s1=1)
     assert path.with_name(f"{path.name}-wal").stat().st_size >= LOG_PAGES * PAGE_BYTES
     journal.close()
     assert path.stat().st_size < 20 * PAGE_BYTES
 
 
-def test_cursors_of_closed_sessions_are_forgotten(path: Path) -> None:
+def test_cursors_of_closed_sessions_are_left_out(path: Path) -> None:
     journal = opened(path)
     journal.commit(Batch(states={"s1": "", "s2": ""}, cursors={("s1", "decider"): 7, ("s2", "decider"): 3}))
     assert journal.cursors() == {("s1", "decider"): 7, ("s2", "decider"): 3}
@@ -77,7 +77,7 @@ def test_cursors_of_closed_sessions_are_forgotten(path: Path) -> None:
     assert journal.cursors() == opened(path).cursors() == {("s2", "decider"): 3}
 
 
-def test_a_commit_that_breaks_in_its_middle_leaves_nothing_behind(path: Path) -> None:
+def test_commit_that_fails_midway_leaves_nothing_behind(path: Path) -> None:
     journal = filled(path, s1=2)
     answer = StoredAnswer('{"task":"one"}', "{}")
     with pytest.raises(Unavailable, match=r"the monitor cannot write its journal monitor\.sqlite"):
@@ -92,7 +92,7 @@ def test_a_commit_that_breaks_in_its_middle_leaves_nothing_behind(path: Path) ->
     assert opened(path).heads == {"s1": 3}
 
 
-def test_the_first_answer_of_a_command_stays(path: Path) -> None:
+def test_first_answer_of_a_command_stays(path: Path) -> None:
     journal = opened(path)
     journal.commit(Batch(answers={START: StoredAnswer("first", '{"n":1}')}))
     with pytest.raises(Unavailable):
@@ -100,7 +100,7 @@ def test_the_first_answer_of_a_command_stays(path: Path) -> None:
     assert journal.answer(START) == StoredAnswer("first", '{"n":1}')
 
 
-def test_the_same_fields_in_another_order_are_the_same_content() -> None:
+def test_same_fields_in_another_order_are_the_same_content() -> None:
     assert same_content('{"study": {"a": 1, "b": [2.0]}}', '{"study": {"b": [2], "a": 1}}')
     assert not same_content('{"study": {"a": 1}}', '{"study": {"a": true}}')
     assert not same_content('{"study": {"a": 1}}', '{"study": {}}')
@@ -111,7 +111,7 @@ def test_digest_of_a_content_is_the_same_content() -> None:
     assert not same_content(digest_of('{"seed":7}'), '{"seed":8}')
 
 
-def test_an_answer_that_is_a_fact_is_kept_once(path: Path) -> None:
+def test_answer_that_is_a_fact_is_stored_once(path: Path) -> None:
     journal = opened(path)
     fact = row(2).model_copy(update={"payload": '{"n":2,"reason":"told once"}'})
     answer = StoredAnswer("{}", fact.payload, seq=2)
@@ -122,7 +122,7 @@ def test_an_answer_that_is_a_fact_is_kept_once(path: Path) -> None:
     assert text == "2"
 
 
-def test_an_empty_batch_is_false_and_any_content_makes_it_true() -> None:
+def test_only_an_empty_batch_is_false() -> None:
     assert not Batch()
     assert Batch(states={"s1": ""})
     assert Batch(cursors={("s1", "monitor"): 1})
@@ -131,13 +131,13 @@ def test_an_empty_batch_is_false_and_any_content_makes_it_true() -> None:
     assert Batch(closed={"s1"})
 
 
-def test_a_folder_that_cannot_be_one_is_a_mistake_in_the_settings(tmp_path: Path) -> None:
+def test_folder_that_cannot_be_made_is_an_error_in_the_settings(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(InvalidSettings, match="SHIFT_DATA"):
         opened(tmp_path / "file" / "monitor.sqlite")
 
 
-def test_a_file_that_is_no_journal_is_a_mistake_in_the_settings(tmp_path: Path) -> None:
+def test_file_that_is_not_a_journal_is_an_error_in_the_settings(tmp_path: Path) -> None:
     (tmp_path / "monitor.sqlite").write_bytes(b"something else entirely" * 100)
     with pytest.raises(InvalidSettings, match="cannot be opened"):
         opened(tmp_path / "monitor.sqlite")
@@ -146,7 +146,7 @@ def test_a_file_that_is_no_journal_is_a_mistake_in_the_settings(tmp_path: Path) 
 # --- the outbox ---
 
 
-def test_a_page_holds_what_comes_after_the_cursors_oldest_first(path: Path) -> None:
+def test_page_holds_facts_after_the_cursors_oldest_first(path: Path) -> None:
     journal = filled(path, s1=3, s2=2)
     page = journal.page(OutboxQuery(cursors={"s1": 1}), {})
     assert seen(page) == [("s1", 2), ("s1", 3), ("s2", 1), ("s2", 2)]
@@ -172,7 +172,7 @@ def test_pages_of_any_size_give_every_row_once_and_end(path: Path, limit: int) -
     assert found == [(s, n) for s in ("s1", "s2") for n in (1, 2, 3)]
 
 
-def test_a_page_of_named_sessions_holds_only_these_and_says_how_far_the_owner_has_read(path: Path) -> None:
+def test_page_of_named_sessions_holds_only_these_and_the_owner_s_cursors(path: Path) -> None:
     journal = filled(path, s1=2, s2=2)
     processed = {("s1", "decider"): 4, ("s2", "decider"): 5, ("s2", "learner"): 6}
     page = journal.page(OutboxQuery(only=["s2", "unheard-of"]), processed)
@@ -181,7 +181,7 @@ def test_a_page_of_named_sessions_holds_only_these_and_says_how_far_the_owner_ha
     assert page.cursors == {"s2": {"decider": 5, "learner": 6}, "unheard-of": {}}
 
 
-def test_an_ended_session_is_told_of_only_by_name_or_to_who_has_begun_it_or_asks_for_all(path: Path) -> None:
+def test_ended_session_is_listed_by_name_to_its_readers_and_on_request(path: Path) -> None:
     journal = filled(path, s1=2, s2=1)
     journal.commit(Batch(closed={"s1"}))
     for there in (journal, opened(path)):
@@ -211,7 +211,7 @@ while True:
 """
 
 
-def test_kill_9_in_the_middle_of_commits_leaves_1_to_n_and_all_that_was_acknowledged(path: Path) -> None:
+def test_kill_9_during_commits_leaves_1_to_n_and_everything_acknowledged(path: Path) -> None:
     program = COMMITTING.format(path=[p for p in sys.path if p.endswith("/tests")])
     for life in range(6):
         worker = subprocess.Popen([sys.executable, "-c", program, str(path)], stdout=subprocess.PIPE, text=True)
@@ -241,7 +241,7 @@ def test_kill_9_in_the_middle_of_commits_leaves_1_to_n_and_all_that_was_acknowle
 
 @contextmanager
 def files_up_to(size: int) -> Iterator[None]:
-    """No file of this process may grow beyond ``size`` bytes, as on a full disk."""
+    """Limit every file of this process to ``size`` bytes, as on a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -264,7 +264,7 @@ def checked_until_full(journal: Journal) -> None:
         journal.check()
 
 
-def test_a_full_disk_refuses_whole_commits_and_what_was_committed_stays_readable(path: Path) -> None:
+def test_full_disk_refuses_whole_commits_and_earlier_ones_stay_readable(path: Path) -> None:
     journal = opened(path)
     with files_up_to(300_000):
         last = committed_until_full(journal)
@@ -280,7 +280,7 @@ def test_a_full_disk_refuses_whole_commits_and_what_was_committed_stays_readable
     assert again.state("s1") == str(last + 1)
 
 
-def test_the_disk_s_room_is_tried_by_a_write_that_changes_nothing(path: Path) -> None:
+def test_disk_is_tried_by_a_write_that_changes_nothing(path: Path) -> None:
     journal = opened(path)
     with files_up_to(300_000):
         last = committed_until_full(journal)
@@ -292,7 +292,7 @@ def test_the_disk_s_room_is_tried_by_a_write_that_changes_nothing(path: Path) ->
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounts a small file system")
-def test_a_disk_of_two_megabytes_that_fills_up_and_is_freed_again(tmp_path: Path) -> None:
+def test_disk_of_two_megabytes_fills_up_and_recovers(tmp_path: Path) -> None:
     small = tmp_path / "small"
     small.mkdir()
     if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "tmpfs", small], capture_output=True).returncode:
@@ -310,7 +310,7 @@ def test_a_disk_of_two_megabytes_that_fills_up_and_is_freed_again(tmp_path: Path
         subprocess.run(["umount", "--lazy", small], check=True)
 
 
-def test_the_file_is_durable_at_each_commit(path: Path) -> None:
+def test_file_is_durable_at_each_commit(path: Path) -> None:
     opened(path)
     reading = sqlite3.connect(path)
     assert reading.execute("PRAGMA journal_mode").fetchone() == ("wal",)
@@ -333,7 +333,7 @@ def test_facts_are_found_by_their_fields_through_an_index(tmp_path: Path) -> Non
     assert "outbox_gaze" in str(plan.fetchall())
 
 
-def test_a_damaged_journal_is_refused_with_what_to_do(tmp_path: Path) -> None:
+def test_damaged_journal_is_refused_with_the_remedy(tmp_path: Path) -> None:
     path = tmp_path / "monitor.sqlite"
     journal = Journal(path, "monitor")
     rows = [OutboxRow(session="s1", seq=n, subject="gaze", payload="x" * 900) for n in range(1, 200)]

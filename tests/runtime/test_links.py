@@ -12,7 +12,7 @@ pytestmark = pytest.mark.anyio
 
 @dataclass
 class Around:
-    """A bus whose owners answer as they are told to, and a clock that stands where it is put."""
+    """A bus whose owners answer as the test decides, and a clock that the test sets."""
 
     now: float = 100.0
     by_router: set[str] = field(default_factory=set)
@@ -38,7 +38,7 @@ def begun() -> tuple[Around, Links]:
     return around, links
 
 
-async def test_an_owner_is_unreached_once_it_has_been_silent_for_a_while_and_counted_once() -> None:
+async def test_silent_owner_is_unreached_after_a_while_and_counted_once() -> None:
     around, links = begun()
     around.now += SILENT_S
     links.answered("learner")
@@ -51,7 +51,7 @@ async def test_an_owner_is_unreached_once_it_has_been_silent_for_a_while_and_cou
     assert links.unreached == []
 
 
-async def test_links_are_made_again_where_an_owner_answers_by_the_router_only() -> None:
+async def test_bus_is_reopened_when_an_owner_answers_through_the_router_only() -> None:
     around, links = begun()
     around.now += SILENT_S + 1
     around.by_router = {"recorder"}
@@ -64,7 +64,7 @@ async def test_links_are_made_again_where_an_owner_answers_by_the_router_only() 
     assert around.reopened == 2
 
 
-async def test_an_owner_that_answers_directly_again_needs_no_new_links() -> None:
+async def test_owner_that_answers_directly_again_needs_no_new_links() -> None:
     around, links = begun()
     around.now += SILENT_S + 1
     around.by_router = around.direct = {"recorder", "learner"}
@@ -72,7 +72,7 @@ async def test_an_owner_that_answers_directly_again_needs_no_new_links() -> None
     assert around.reopened == 0
 
 
-async def test_an_owner_that_never_answered_is_still_starting() -> None:
+async def test_owner_that_never_answered_counts_as_starting() -> None:
     around = Around()
     links = Links(around, ("recorder",), around.lost.append, lambda: around.now)  # type: ignore[arg-type]
     around.now += 60

@@ -129,7 +129,7 @@ async def test_health_is_none_and_metrics_are_empty_without_an_answer(bus: Memor
 
 async def test_command_is_carried_out_once_even_if_attempts_time_out(tmp_path: Path) -> None:
     rig = Rig(tmp_path / "decider.sqlite")
-    rig.recorder.put_out(session(), config())
+    rig.recorder.publish(session(), config())
     rig.start()
     await rig.ready()
     client = MeshClient(rig.bus)

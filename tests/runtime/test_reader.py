@@ -1,9 +1,8 @@
-"""The reader: exactly cursor + 1, whatever becomes of the hints and of the owner."""
+"""The reader: it delivers exactly cursor + 1, whatever happens to notifications and to the owner."""
 
 from __future__ import annotations
 
 import asyncio
-import itertools
 from collections.abc import Coroutine
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,51 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_runtime import reader as reader_module
 from shift_runtime.bus.memory import Hub, MemoryBus
-from shift_runtime.bus.protocol import Bus, Handle, Request
+from shift_runtime.bus.protocol import Bus, Request
 from shift_runtime.reader import Reader, ReadFact, fact_of
-from shift_schemas.codec import decode, encode
+from shift_schemas.codec import encode
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.keys import FactKey, ServiceKey, build_key
-from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
+from shift_schemas.messages import OutboxPage, OutboxRow
+from support.outbox_owner import Owner
 from support.runtime_fixtures import marker, row, until
 
 OUTBOX = build_key(ServiceKey("recorder", "outbox"))
 
 
-@dataclass
-class Owner:
-    """Puts out markers as the recorder does, with pages of ``most`` rows. It can die and come back."""
-
-    bus: Bus
-    most: int = 3
-    rows: dict[str, list[OutboxRow]] = field(default_factory=dict)
-    asked: list[OutboxQuery] = field(default_factory=list)
-    _served: Handle | None = None
-
-    def live(self) -> Owner:
-        self._served = self.bus.serve(OUTBOX, self._page)
-        return self
-
-    def die(self) -> None:
-        assert self._served is not None
-        self._served.close()
-
-    def commit(self, count: int, session: str = "s1") -> None:
-        rows = self.rows.setdefault(session, [])
-        rows += [row(len(rows) + 1 + i, session) for i in range(count)]
-
-    def hint(self, seq: int, session: str = "s1") -> None:
-        found = self.rows[session][seq - 1]
-        self.bus.put(build_key(FactKey(session, "marker")), found.payload.encode(), attachment=str(seq).encode())
-
-    def _page(self, request: Request) -> None:
-        query = decode(OutboxQuery, request.payload)
-        self.asked.append(query)
-        wanted = self.rows if query.only is None else {s: self.rows.get(s, []) for s in query.only}
-        rows = list(itertools.chain.from_iterable(found[query.cursors.get(s, 0) :] for s, found in wanted.items()))
-        heads = {s: len(found) for s, found in wanted.items()}
-        page = OutboxPage(owner="recorder", rows=rows[: self.most], heads=heads, complete=len(rows) < self.most)
-        request.reply(encode(page))
+def recorder(bus: Bus, most: int = 3) -> Owner:
+    """Return an owner of sessions with pages of ``most`` rows."""
+    return Owner(bus, "recorder", most)
 
 
 @dataclass
@@ -82,7 +51,7 @@ class Reading:
 
 async def read_up() -> tuple[Owner, Reading]:
     bus = MemoryBus(Hub())
-    return Owner(bus).live(), Reading(bus)
+    return recorder(bus).live(), Reading(bus)
 
 
 async def settled() -> None:
@@ -94,15 +63,15 @@ def run(work: Coroutine[Any, Any, None]) -> None:
     asyncio.run(work)
 
 
-# --- hints ---
+# --- notifications ---
 
 
-def test_hints_in_their_order_are_delivered_without_a_single_pull() -> None:
+def test_notifications_in_order_are_delivered_without_a_pull() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(3)
         for n in (1, 2, 3):
-            owner.hint(n)
+            owner.notify(n)
         await settled()
         assert [(r.owner, r.seq, r.fact, r.payload) for r in reading.found] == [
             ("recorder", n, marker(n), marker(n).model_dump_json()) for n in (1, 2, 3)
@@ -112,24 +81,24 @@ def test_hints_in_their_order_are_delivered_without_a_single_pull() -> None:
     run(test())
 
 
-def test_a_gap_is_pulled_at_once() -> None:
+def test_gap_is_pulled_at_once() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(8)
-        owner.hint(1)
-        owner.hint(8)
+        owner.notify(1)
+        owner.notify(8)
         await until(lambda: reading.sequence() == list(range(1, 9)))
         assert owner.asked[0].cursors == {"s1": 1}
 
     run(test())
 
 
-def test_what_was_read_is_not_delivered_again() -> None:
+def test_delivered_fact_is_not_delivered_again() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
         for n in (1, 1, 2, 1, 2, 2):
-            owner.hint(n)
+            owner.notify(n)
         await settled()
         await reading.reader.pull("recorder")
         assert reading.sequence() == [1, 2]
@@ -137,7 +106,7 @@ def test_what_was_read_is_not_delivered_again() -> None:
     run(test())
 
 
-def test_without_any_hint_a_pull_reads_page_by_page_to_the_end() -> None:
+def test_pull_without_notifications_reads_page_by_page_to_the_end() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(7)
@@ -150,10 +119,10 @@ def test_without_any_hint_a_pull_reads_page_by_page_to_the_end() -> None:
     run(test())
 
 
-def test_it_goes_on_where_its_cursor_says() -> None:
+def test_reader_continues_at_its_cursor() -> None:
     async def test() -> None:
         bus = MemoryBus(Hub())
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         reading = Reading(bus, cursors={("s1", "recorder"): 4})
         owner.commit(6)
         await reading.reader.pull("recorder")
@@ -179,7 +148,7 @@ def test_it_goes_on_where_its_cursor_says() -> None:
         ("shift/v1/-x/marker", marker(1).model_dump_json().encode(), b"1"),
     ],
 )
-def test_a_hint_that_is_no_fact_is_counted_and_dropped(key: str, payload: bytes, attachment: bytes) -> None:
+def test_invalid_notification_is_counted_and_dropped(key: str, payload: bytes, attachment: bytes) -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(1)
@@ -187,14 +156,14 @@ def test_a_hint_that_is_no_fact_is_counted_and_dropped(key: str, payload: bytes,
         await settled()
         assert reading.found == []
         assert reading.dropped == ["malformed"]
-        owner.hint(1)
+        owner.notify(1)
         await settled()
         assert reading.sequence() == [1]
 
     run(test())
 
 
-def test_a_sequence_of_0_is_never_the_next_one() -> None:
+def test_sequence_0_is_never_next() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.bus.put("shift/v1/s1/marker", marker(1).model_dump_json().encode(), attachment=b"0")
@@ -204,14 +173,14 @@ def test_a_sequence_of_0_is_never_the_next_one() -> None:
     run(test())
 
 
-def test_a_forgotten_session_is_read_no_more() -> None:
+def test_forgotten_session_is_not_read_any_more() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
-        owner.hint(1)
+        owner.notify(1)
         await settled()
         reading.reader.forget("s1")
-        owner.hint(2)
+        owner.notify(2)
         await settled()
         assert await reading.reader.pull("recorder")
         assert reading.sequence() == [1]
@@ -222,7 +191,7 @@ def test_a_forgotten_session_is_read_no_more() -> None:
 # --- pulls ---
 
 
-def test_an_owner_that_is_not_there_is_no_answer_and_nothing_is_lost() -> None:
+def test_absent_owner_gives_no_answer_and_nothing_is_lost() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
@@ -237,11 +206,11 @@ def test_an_owner_that_is_not_there_is_no_answer_and_nothing_is_lost() -> None:
     run(test())
 
 
-def test_nobody_counts_as_read_before_the_recorder_since_no_session_is_known_before() -> None:
-    """Facts of a session that nobody told of are held back: an owner read that early is not read."""
+def test_no_owner_is_synced_before_the_recorder() -> None:
+    """Facts of an unknown session are deferred, so an owner that was read that early is not synced."""
 
     async def test() -> None:
-        owner = Owner(MemoryBus(hub := Hub()))
+        owner = recorder(MemoryBus(hub := Hub()))
         learner = MemoryBus(hub)
         page = OutboxPage(owner="learner", rows=[], heads={}, complete=True)
         learner.serve(build_key(ServiceKey("learner", "outbox")), lambda request: request.reply(encode(page)))
@@ -256,7 +225,7 @@ def test_nobody_counts_as_read_before_the_recorder_since_no_session_is_known_bef
     run(test())
 
 
-def test_what_is_asked_for_during_a_pull_gets_one_more_after_it() -> None:
+def test_request_during_a_pull_causes_one_more_pull() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(1)
@@ -271,7 +240,7 @@ def test_what_is_asked_for_during_a_pull_gets_one_more_after_it() -> None:
     run(test())
 
 
-def test_a_session_by_name_is_read_alone_and_its_page_kept() -> None:
+def test_named_session_is_read_alone_and_its_page_is_kept() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(2)
@@ -286,12 +255,12 @@ def test_a_session_by_name_is_read_alone_and_its_page_kept() -> None:
 
 
 @pytest.mark.parametrize("page", [b"", b"{}", b"\xff", b"[" * 10_000, encode(marker(1))])
-def test_a_page_that_is_none_is_counted_and_another_answer_taken(page: bytes) -> None:
+def test_invalid_page_is_counted_and_another_answer_is_used(page: bytes) -> None:
     async def test() -> None:
         bus = MemoryBus(Hub())
         bus.serve(OUTBOX, lambda r: r.reply(page))
         bus.serve(OUTBOX, lambda r: r.refuse(b"no"))
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         owner.commit(2)
         reading = Reading(bus)
         assert await reading.reader.pull("recorder")
@@ -301,7 +270,7 @@ def test_a_page_that_is_none_is_counted_and_another_answer_taken(page: bytes) ->
     run(test())
 
 
-def test_a_row_that_is_no_fact_stops_the_reading_and_is_counted() -> None:
+def test_invalid_row_stops_the_pull_and_is_counted() -> None:
     async def test() -> None:
         owner, reading = await read_up()
         owner.commit(3)
@@ -316,16 +285,16 @@ def test_a_row_that_is_no_fact_stops_the_reading_and_is_counted() -> None:
 @pytest.mark.parametrize(
     "bad", [row(1).model_copy(update={"subject": "nonsense"}), row(1, "s2").model_copy(update={"session": "s1"})]
 )
-def test_a_row_of_no_subject_or_of_another_session_is_malformed(bad: OutboxRow) -> None:
+def test_row_of_an_unknown_subject_or_another_session_is_malformed(bad: OutboxRow) -> None:
     with pytest.raises(MalformedMessage):
         fact_of(bad)
 
 
-def test_a_pull_that_gets_nowhere_ends_instead_of_asking_without_pause() -> None:
+def test_pull_without_progress_ends() -> None:
     async def test() -> None:
-        """Facts of a session that cannot be taken yet (the gateway's replica, before the recorder answers)."""
+        """Put back a fact whose session is not known yet, as the gateway's read model does."""
         bus = MemoryBus(Hub())
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         owner.commit(10)
 
         def not_yet(read: ReadFact) -> None:
@@ -339,12 +308,12 @@ def test_a_pull_that_gets_nowhere_ends_instead_of_asking_without_pause() -> None
     run(test())
 
 
-def test_rows_of_a_session_that_is_done_do_not_hide_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An owner that has not closed the session yet offers all of it again: it must not fill every page."""
+def test_rows_of_finished_sessions_do_not_hide_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An owner that has not closed the session yet sends all of it again; that must not fill every page."""
 
     async def test() -> None:
         bus = MemoryBus(Hub())
-        owner = Owner(bus).live()
+        owner = recorder(bus).live()
         owner.commit(10, "s1")
         reading = Reading(bus)
         await reading.reader.pull("recorder")
@@ -358,7 +327,7 @@ def test_rows_of_a_session_that_is_done_do_not_hide_the_others(monkeypatch: pyte
     run(test())
 
 
-def test_it_pulls_of_its_own_accord_from_time_to_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_reader_pulls_periodically(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(reader_module, "PULL_EVERY_S", 0.01)
 
     async def test() -> None:
@@ -380,7 +349,7 @@ def test_it_pulls_of_its_own_accord_from_time_to_time(monkeypatch: pytest.Monkey
 
 EVENT = st.one_of(
     st.tuples(st.just("commit"), st.integers(1, 4)),
-    st.tuples(st.just("hint"), st.integers(1, 40)),
+    st.tuples(st.just("notification"), st.integers(1, 40)),
     st.tuples(st.just("junk"), st.sampled_from([b"", b"{}", b"\xff", b"null"])),
     st.tuples(st.just("pull"), st.just(0)),
     st.tuples(st.just("wait"), st.integers(1, 5)),
@@ -390,61 +359,80 @@ EVENT = st.one_of(
 )
 
 
+class Interleaving:
+    """A reader and its owner, either of which may stop at any point, and what the reader has committed."""
+
+    def __init__(self, most: int) -> None:
+        self.bus = MemoryBus(Hub())
+        self.owner = recorder(self.bus, most).live()
+        self.alive = True
+        self.reading = Reading(self.bus)
+        self.delivered: dict[str, list[int]] = {"s1": [], "s2": []}
+
+    async def apply(self, session: str, kind: str, value: Any) -> None:
+        """Let one event happen."""
+        rows = self.owner.rows.setdefault(session, [])
+        match kind:
+            case "commit":
+                self.owner.commit(value, session)
+            case "notification" if value <= len(rows):
+                self.owner.notify(value, session)
+            case "junk":
+                self.bus.put(build_key(FactKey(session, "marker")), value, attachment=str(len(rows) + 1).encode())
+            case "pull":
+                self.reading.reader.pull_soon("recorder")
+            case "wait":
+                for _ in range(value):
+                    await asyncio.sleep(0)
+            case "die" if self.alive:
+                self.owner.die()
+                self.alive = False
+            case "live":
+                self.revive()
+            case "reader dies":
+                await self.restart_reader(value)
+
+    def revive(self) -> None:
+        """Let the owner answer."""
+        if not self.alive:
+            self.owner.live()
+            self.alive = True
+
+    def keep(self, lost: int) -> None:
+        """Commit what the reader delivered, all but the last ``lost`` facts of each session."""
+        for session, sequence in self.delivered.items():
+            sequence += self.reading.sequence(session)
+            if lost:
+                del sequence[-lost:]
+
+    async def restart_reader(self, lost: int) -> None:
+        """Replace the reader by one that continues where the old one had committed."""
+        await settled()
+        self.keep(lost)
+        await self.bus.close()
+        if self.alive:
+            self.owner.live()
+        self.reading = Reading(self.bus, {(s, "recorder"): len(n) for s, n in self.delivered.items()})
+
+
 @settings(max_examples=300, deadline=None)
 @given(
     events=st.lists(st.tuples(st.sampled_from(["s1", "s2"]), EVENT), max_size=40),
     most=st.integers(1, 5),
 )
-def test_any_interleaving_delivers_1_to_n_in_order_once(events: list[Any], most: int) -> None:
-    """Hints lost, doubled, late or malformed, pulls in between, the owner or the reader restarted at any point."""
+def test_any_interleaving_delivers_1_to_n_once_in_order(events: list[Any], most: int) -> None:
+    """Notifications are lost, doubled, late or malformed; pulls and restarts come at any point."""
 
     async def test() -> None:
-        bus = MemoryBus(Hub())
-        owner = Owner(bus, most).live()
-        reading, alive = Reading(bus), True
-        delivered: dict[str, list[int]] = {"s1": [], "s2": []}
-
-        def keep(upto: int) -> None:
-            """What a reader that died had committed: all but the last ``upto`` that it was given."""
-            for session, sequence in delivered.items():
-                sequence += reading.sequence(session)
-                if upto:
-                    del sequence[-upto:]
-
+        mesh = Interleaving(most)
         for session, (kind, value) in events:
-            rows = owner.rows.setdefault(session, [])
-            match kind:
-                case "commit":
-                    owner.commit(value, session)
-                case "hint" if value <= len(rows):
-                    owner.hint(value, session)
-                case "junk":
-                    bus.put(build_key(FactKey(session, "marker")), value, attachment=str(len(rows) + 1).encode())
-                case "pull":
-                    reading.reader.pull_soon("recorder")
-                case "wait":
-                    for _ in range(value):
-                        await asyncio.sleep(0)
-                case "die" if alive:
-                    owner.die()
-                    alive = False
-                case "live" if not alive:
-                    owner.live()
-                    alive = True
-                case "reader dies":
-                    await settled()
-                    keep(value)
-                    await bus.close()
-                    if alive:
-                        owner.live()
-                    reading = Reading(bus, {(s, "recorder"): len(n) for s, n in delivered.items()})
-        if not alive:
-            owner.live()
+            await mesh.apply(session, kind, value)
+        mesh.revive()
         await settled()
-        assert await reading.reader.pull("recorder")
-        keep(0)
-        for session, rows in owner.rows.items():
-            assert delivered[session] == list(range(1, len(rows) + 1))
+        assert await mesh.reading.reader.pull("recorder")
+        mesh.keep(0)
+        for session, rows in mesh.owner.rows.items():
+            assert mesh.delivered[session] == list(range(1, len(rows) + 1))
 
     run(test())
 
@@ -469,5 +457,5 @@ async def older_journal_is_named() -> None:
     assert "ends at message 0" in next(iter(reader.misfits.values()))
 
 
-def test_a_journal_that_is_older_than_what_was_read_of_it_is_named() -> None:
+def test_journal_older_than_its_reader_is_reported() -> None:
     asyncio.run(older_journal_is_named())

@@ -1,4 +1,4 @@
-"""What the tests of the runtime share: endpoints, waiting, facts to read, a core small enough to check by hand."""
+"""Helpers of the runtime's tests: endpoints, waiting, and facts to read."""
 
 from __future__ import annotations
 
@@ -13,32 +13,32 @@ from shift_schemas.messages import Marker, OutboxRow
 from shift_schemas.timestamps import Stamp
 
 SOON_S = 10.0
-"""Nothing here takes that long; a test that waits so long has failed."""
+"""A test that waits so long has failed."""
 
 
 def free_endpoint() -> str:
-    """An endpoint that nobody listens on now."""
+    """Return an endpoint on which nobody listens."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 async def until(there: Callable[[], Any]) -> None:
-    """Wait until ``there()``."""
+    """Wait until ``there()`` is true."""
     async with asyncio.timeout(SOON_S):
         while not there():  # noqa: ASYNC110
             await asyncio.sleep(0.005)
 
 
 async def until_asked(ask: Callable[[], Awaitable[Any]]) -> None:
-    """Wait until what is asked for is true: a declaration takes its time to get around."""
+    """Wait until ``ask()`` returns something true; a declaration needs time to reach everybody."""
     async with asyncio.timeout(SOON_S):
         while not await ask():  # noqa: ASYNC110
             await asyncio.sleep(0.01)
 
 
 async def linked(*buses: Bus) -> None:
-    """Wait until each of the buses hears each of them."""
+    """Wait until every bus receives the publications of every other."""
     heard: dict[str, set[str]] = {f"link/{i}": set() for i in range(len(buses))}
     handles = [bus.subscribe("link/*", lambda m, i=i: heard[f"link/{i}"].add(m.key)) for i, bus in enumerate(buses)]
     async with asyncio.timeout(SOON_S):
@@ -51,15 +51,15 @@ async def linked(*buses: Bus) -> None:
 
 
 def marker(n: int, session: str = "s1", text: str = "") -> Marker:
-    """The ``n``-th marker."""
+    """Return the ``n``-th marker."""
     return Marker(session=session, stamp=Stamp.of(n), marker_id=f"m{n}", text=text or f"note {n}")
 
 
 def row(n: int, session: str = "s1", text: str = "") -> OutboxRow:
-    """The ``n``-th marker in its owner's outbox."""
+    """Return the ``n``-th marker as a row of its owner's outbox."""
     return OutboxRow(session=session, seq=n, subject="marker", payload=marker(n, session, text).model_dump_json())
 
 
 def loads(payload: bytes) -> Any:
-    """A JSON payload."""
+    """Return a JSON payload's value."""
     return json.loads(payload)

@@ -1,16 +1,15 @@
-"""A worker in one process with the tester: a core small enough to check by hand, owners to read, a full disk."""
+"""A worker in the test's process: a core that is small enough to check by hand, owners to read, and a full disk."""
 
 from __future__ import annotations
 
 import asyncio
-import itertools
 import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from shift_runtime.bus.memory import Hub, MemoryBus
-from shift_runtime.bus.protocol import Bus, Handle, Incoming, Reply, Request
+from shift_runtime.bus.protocol import Incoming, Reply
 from shift_runtime.clock import ManualClock
 from shift_runtime.journal import Batch, Journal
 from shift_runtime.metrics import Metrics
@@ -19,23 +18,21 @@ from shift_runtime.service.loop import Worker
 from shift_schemas.codec import decode, encode
 from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import Problem, Unavailable, UnknownThing
-from shift_schemas.keys import CommandKey, FactKey, ServiceKey, build_key
+from shift_schemas.keys import CommandKey, ServiceKey, build_key
 from shift_schemas.messages import (
     Answer,
     Config,
     Decide,
-    Fact,
     Fixation,
     Health,
-    OutboxPage,
     OutboxQuery,
-    OutboxRow,
     Override,
     Seen,
     Session,
 )
 from shift_schemas.timestamps import Stamp
 
+from support.outbox_owner import Owner
 from support.runtime_fixtures import until
 
 WAIT_S = 0.15
@@ -43,7 +40,7 @@ WAIT_S = 0.15
 
 @dataclass(frozen=True)
 class Notes:
-    """What the core below did, in its order."""
+    """The state of the core below: what it did, in order."""
 
     session: str
     config: int = 0
@@ -55,9 +52,9 @@ class Notes:
 
 
 def step(state: Notes | None, message: Any, now: Stamp, timed_out: bool = False) -> Step[Notes]:
-    """Notes each fixation and each decision, and puts each note out as an override.
+    """Note each fixation and each decision, and publish each note as an override.
 
-    A task ``after-3`` waits for three fixations, ``unknown`` is known after the first, ``breaks`` breaks.
+    A task ``after-3`` waits for three fixations, ``unknown`` is known after the first one, and ``breaks`` raises.
     """
     if isinstance(message, Session):
         return Step(state or Notes(message.session))
@@ -103,7 +100,7 @@ READS = {"recorder": frozenset({"session", "config"}), "monitor": frozenset({"fi
 CORE: Core[Notes] = Core("decider", step, dump, load, READS)
 
 
-# --- those that it reads ---
+# --- facts of the owners that it reads ---
 
 
 def session(name: str = "s1", state: Any = "live") -> Session:
@@ -120,42 +117,6 @@ def fixation(n: int, name: str = "s1") -> Fixation:
     return Fixation(
         session=name, stamp=Stamp.of(n), source="eyes", start_s=float(n), duration_s=0.1, x=0.5, y=0.5, aoi=""
     )
-
-
-@dataclass
-class Owner:
-    """Somebody else's journal."""
-
-    bus: Bus
-    name: str
-    rows: dict[str, list[OutboxRow]] = field(default_factory=dict)
-    asked: int = 0
-    _served: Handle | None = None
-
-    def live(self) -> Owner:
-        self._served = self.bus.serve(build_key(ServiceKey(self.name, "outbox")), self._page)
-        return self
-
-    def die(self) -> None:
-        assert self._served is not None
-        self._served.close()
-
-    def put_out(self, *facts: Fact, hint: bool = True) -> None:
-        for fact in facts:
-            rows = self.rows.setdefault(fact.session, [])
-            payload = fact.model_dump_json()
-            rows.append(OutboxRow(session=fact.session, seq=len(rows) + 1, subject=fact.subject, payload=payload))
-            if hint:
-                key = build_key(FactKey(fact.session, fact.subject))
-                self.bus.put(key, payload.encode(), attachment=str(len(rows)).encode())
-
-    def _page(self, request: Request) -> None:
-        self.asked += 1
-        query = decode(OutboxQuery, request.payload)
-        wanted = self.rows if query.only is None else {s: self.rows.get(s, []) for s in query.only}
-        rows = list(itertools.chain.from_iterable(found[query.cursors.get(s, 0) :] for s, found in wanted.items()))
-        heads = {s: len(found) for s, found in wanted.items()}
-        request.reply(encode(OutboxPage(owner=self.name, rows=rows, heads=heads, complete=True)))
 
 
 class FullDisk(Journal):
@@ -178,7 +139,7 @@ class FullDisk(Journal):
 
 @dataclass
 class Rig:
-    """A worker under test, with its owners and a bus of the tester's."""
+    """A worker under test, with its owners and the test's own bus."""
 
     path: Path
     hub: Hub = field(default_factory=Hub)
@@ -191,7 +152,7 @@ class Rig:
         self.bus.subscribe("shift/v1/*/override", self.published.append)
 
     def start(self) -> Worker[Notes]:
-        """Begin a life of the worker."""
+        """Start the worker."""
         self.journal = FullDisk(self.path, "decider")
         self.own_bus = MemoryBus(self.hub)
         self.worker = Worker(CORE, self.own_bus, self.journal, ManualClock(5), Metrics("decider"))
@@ -199,7 +160,7 @@ class Rig:
         return self.worker
 
     async def crash(self) -> None:
-        """End it without another word, wherever it is; what was not committed is gone."""
+        """End the worker at once; what was not committed is lost."""
         self.running.cancel()
         await asyncio.gather(self.running, return_exceptions=True)
         self.worker.tasks.cancel()
@@ -215,7 +176,7 @@ class Rig:
     async def decide(
         self, command_id: str, task: str = "any", need: Seen | None = None, timeout_s: float = 5.0, name: str = "s1"
     ) -> Answer:
-        """Ask; its answer, or its refusal raised."""
+        """Return the worker's answer, or raise its refusal."""
         command = Decide(command_id=command_id, session=name, task=task, need=need or Seen())
         (reply,) = await self.ask(build_key(CommandKey(name, "decide")), encode(command), timeout_s)
         if not reply.ok:
@@ -223,7 +184,7 @@ class Rig:
         return decode(Answer, reply.payload)
 
     async def ask(self, key: str, payload: bytes, timeout_s: float = 5.0) -> list[Reply]:
-        """The replies of who is there, once somebody is."""
+        """Return the replies, once the worker answers."""
         while not (replies := await self.bus.get(key, payload, timeout_s=timeout_s)):
             assert not self.running.done()
             await asyncio.sleep(0)
@@ -244,20 +205,20 @@ class Rig:
         )
 
     def outbox(self, name: str = "s1") -> list[tuple[int, str]]:
-        """What the worker committed: sequence and note."""
+        """Return what the worker committed: sequence and note."""
         rows = self.journal.page(OutboxQuery(only=[name], limit=10_000), {}).rows
         return [(row.seq, json.loads(row.payload)["reason"]) for row in rows]
 
     def committed(self, name: str = "s1") -> Notes:
-        """The committed state."""
+        """Return the committed state."""
         text = self.journal.state(name)
         return load(text) if text else Notes(name)
 
     def notes(self, name: str = "s1") -> tuple[str, ...]:
-        """The notes of the committed state."""
+        """Return the notes of the committed state."""
         return self.committed(name).notes
 
     def config(self) -> int:
-        """The version of the configuration that the worker has read, committed or not."""
+        """Return the version of the configuration that the worker has read, committed or not."""
         state = self.worker.states.loaded("s1")
         return state.config if state else 0

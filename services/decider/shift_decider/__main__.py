@@ -6,7 +6,7 @@ from shift_decider.service import CORE
 
 
 def main() -> None:
-    """Run it."""
+    """Run the decider."""
     run_service(CORE)
 
 

@@ -1,4 +1,4 @@
-"""The monitor as a service: its core, the streams that it reads, and the lookup that its gaze needs."""
+"""The monitor's shell: its core and the owners that it reads. The worker does the rest."""
 
 from __future__ import annotations
 
@@ -26,5 +26,4 @@ CORE: Core[MonitorState] = Core(
     reads=READS["monitor"],
     prepare=add_earlier_gaze,
     lookups={"gaze": ("source", "seq")},
-    streams={"gaze": GazeChunk},
 )

@@ -1,0 +1,1 @@
+"""The recorder: it owns the session, records every fact, and ends sessions."""

@@ -1,7 +1,7 @@
 """The recorder's core: ``step(state, command, now) -> Step``. Pure.
 
-It owns the session (start, end, configure, mark). Studies by name are looked up, and recordings
-finished, by the shell; here they arrive resolved.
+It owns the session: start, end, configure and mark. The shell finds studies by their names and finishes recordings; the
+core receives the results.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from shift_study.study import Study, fixed_changes
 
 
 class FinishSession(EndSession):
-    """The second half of an end: the recording is finished. Its content is that of the end it completes."""
+    """The second half of an end, once the recording is finished. Its content is that of the first half."""
 
     procedure: ClassVar[str] = "end_session"
     event: ClassVar[SessionEvent] = "finish"
@@ -44,40 +44,40 @@ class FinishSession(EndSession):
     counts: dict[str, int]
 
     def content(self) -> str:
-        """The end's."""
+        """Return the content of the end."""
         return EndSession(command_id=self.command_id, session=self.session).content()
 
 
 @dataclass(frozen=True)
 class RecorderState:
-    """All that the recorder decides about one session."""
+    """The recorder's state of one session."""
 
     fact: Session
     config: Config
     original: str
-    """The study as given, before its condition, as JSON; it is attached to the recording."""
+    """The study as JSON, as it was given, without the condition's changes; it is attached to the recording."""
 
 
 _STATE = TypeAdapter(RecorderState)
 
 
 def dump(state: RecorderState) -> str:
-    """The state as JSON; :func:`load` takes it back exactly."""
+    """Return the state as JSON, from which :func:`load` restores it exactly."""
     return _STATE.dump_json(state).decode()
 
 
 def load(text: str) -> RecorderState:
-    """The state that :func:`dump` wrote."""
+    """Return the state that :func:`dump` wrote."""
     return _STATE.validate_json(text)
 
 
 def seed_of(session: str) -> int:
-    """The seed of a session that was given none: made from its id, so that a restart gives the same."""
+    """Return the seed of a session without one: it is made from the id, so that it is the same after a restart."""
     return int.from_bytes(hashlib.sha256(session.encode()).digest()[:6], "big")
 
 
 def session_answer(fact: Session) -> dict[str, Any]:
-    """A session as the doors show it."""
+    """Return a session as the gateway shows it."""
     data: dict[str, Any] = fact.model_dump(mode="json", exclude={"stamp", "seen", "subject"})
     return data
 
@@ -85,7 +85,7 @@ def session_answer(fact: Session) -> dict[str, Any]:
 def step(
     state: RecorderState | None, message: Fact | Command, now: Stamp, timed_out: bool = False
 ) -> Step[RecorderState]:
-    """Carry out one command.
+    """Return the result of one command.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def _check_condition(study: Study, condition: str | None) -> None:
 
 
 def _start_warnings(study: Study, command: StartSession) -> list[str]:
-    """What is accepted and may not be meant; a session of format 1 records none."""
+    """Return warnings about what is valid but perhaps not intended; a session of format 1 records none."""
     if command.format == 1:
         return []
     if command.condition is not None or not study.conditions:
@@ -155,9 +155,9 @@ def _end(state: RecorderState, command: EndSession, now: Stamp) -> Step[Recorder
 
 
 def ended(state: RecorderState) -> Session:
-    """Return the session as it ended, as its own recording has it (which cannot hold its own checksum).
+    """Return the ended session as its recording has it, which cannot contain its own checksum.
 
-    The end has the time at which it was accepted, which is committed: each attempt to finish says the same.
+    Its end time is that of the first half, which is committed, so that every attempt to finish gives the same time.
     """
     name = f"{state.fact.session}.mcap"
     return state.fact.model_copy(update={"state": ENDED, "ended": state.fact.stamp, "recording": name})
@@ -183,12 +183,12 @@ def _configure(state: RecorderState, command: Configure, now: Stamp) -> Step[Rec
 
 
 def config_answer(config: Config) -> dict[str, Any]:
-    """The study in force with its version, as the doors show it."""
+    """Return the study in force with its version, as the gateway shows it."""
     return {**json.loads(config.study), "version": config.version}
 
 
 def check_changeable(before: Study, after: Study) -> None:
-    """Raise :class:`MalformedMessage` that names what must not change while a session runs."""
+    """Raise :class:`MalformedMessage` with the names of settings that must not change while a session runs."""
     if names := fixed_changes(before, after):
         rule = "it cannot change while a session runs; end the session and start another one"
         raise MalformedMessage(

@@ -1,1 +1,1 @@
-"""The shared shell: bus, journal, reader, worker, clock, settings, router and the mesh client."""
+"""The runtime: bus, journal, reader, the worker that runs a core, read model, clients, settings and the router."""

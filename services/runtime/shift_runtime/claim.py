@@ -1,9 +1,9 @@
-"""The claim on a key space: each owner is there once, on all routers that are joined.
+"""The claim on a key space: each owner exists once on all routers that are connected.
 
-Two meshes on one router would answer each other's requests and record each other's sessions. So a service asks, before
-it answers anything, whether another one answers under its key, and again now and then: two can start at the same
-moment, and two routers can be joined later. A data folder has an id of its own; an answer with another id is another
-mesh's. Then the one that began later yields. A service that comes back after a crash has the id that it had.
+Two meshes on one router would answer each other's requests and record each other's sessions. So a service asks whether
+another one answers under its key, before it answers anything and again periodically: two can start at the same moment,
+and two routers can be connected later. Each data folder has an id; an answer with another id is another mesh's, and the
+service that started later yields. A service that restarts after a crash has the same id as before.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from shift_runtime.bus.protocol import Bus, Reply
 from shift_runtime.polling import poll
 
 JOIN_WAIT_S = 1.0
-"""How long a service waits for its first link before it begins without having asked; it asks again later."""
+"""How long a service waits for its first link. Then it starts without an answer, and asks again later."""
 ASK_S = 1.0
 LOOK_AGAIN_S = (0.5, 1.5, 3.0)
-"""Pauses before it is asked again; the last one goes on."""
+"""Pauses between the questions; the last pause repeats."""
 
 
 class OwnedElsewhere(InvalidSettings):
-    """Another mesh owns what this service would own."""
+    """Another mesh owns the keys of this service."""
 
     title = "Two meshes share one router"
 
 
 def mesh_id(folder: Path) -> str:
-    """Return the id of a data folder, made once and kept in ``folder/mesh-id``.
+    """Return the id of a data folder. It is created once and kept in ``folder/mesh-id``.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def mesh_id(folder: Path) -> str:
     if not path.exists():
         try:
             own.write_text(secrets.token_hex(8))
-            os.link(own, path)  # whole or not at all; of several services that begin at once, one makes it
+            os.link(own, path)  # atomic: where several services start at once, one creates it
         except FileExistsError:
             pass
         finally:
@@ -57,7 +57,7 @@ def mesh_id(folder: Path) -> str:
 
 
 class Claim:
-    """One service's claim. ``since`` is when its process began, ``mesh`` its data folder's id."""
+    """The claim of one service. ``since`` is the start of its process, ``mesh`` the id of its data folder."""
 
     def __init__(self, bus: Bus, service: str, mesh: str, since: Stamp) -> None:
         self.bus = bus
@@ -65,16 +65,16 @@ class Claim:
         self.mesh = mesh
         self.since = since
         self.conflict = ""
-        """A sentence while another one answers that began later and has not yielded yet."""
+        """A sentence while a service that started later answers under the same key."""
 
     async def make(self) -> None:
-        """Ask before anything is answered. Raises :class:`OwnedElsewhere` where another mesh has the key."""
+        """Ask before anything is answered. Raise :class:`OwnedElsewhere` if another mesh has the key."""
         await poll(self._joined, timeout_s=JOIN_WAIT_S, pause_s=0.01)
         for other in await self._others():
             raise OwnedElsewhere(self._refusal(other))
 
     async def keep(self) -> None:
-        """Ask now and then, for ever. Raises :class:`OwnedElsewhere` where this one must yield."""
+        """Ask periodically, without end. Raise :class:`OwnedElsewhere` if this service must yield."""
         pauses = [*LOOK_AGAIN_S]
         while True:
             await asyncio.sleep(pauses.pop(0) if len(pauses) > 1 else pauses[0])
@@ -102,17 +102,17 @@ class Claim:
 
 
 def healths_of(replies: list[Reply]) -> Iterator[Health]:
-    """Yield the health of each service among these replies."""
+    """Yield the health of each service that replied; other replies are skipped."""
     for reply in replies:
         try:
             if reply.ok:
                 yield decode(Health, reply.payload)
-        except MalformedMessage:  # not one of ours
+        except MalformedMessage:  # a reply of another program
             continue
 
 
 def one_health(service: str, found: list[Health]) -> Health | None:
-    """Return what can be said of a service, of which there may be none or two."""
+    """Return the health of a service: None if it did not answer, and not ready if two meshes answered."""
     if len({health.mesh for health in found}) < 2:
         return found[0] if found else None
     folders = " and ".join(sorted(health.data or "unknown" for health in found))

@@ -1,4 +1,4 @@
-"""The clock is handed in: the system's in a service, a hand-set one in a test."""
+"""The clock: the system's in a service, one that is set by hand in a test."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from shift_schemas.timestamps import Stamp
 
 
 class Clock(Protocol):
-    """Says what time it is."""
+    """The source of the current time."""
 
     def now(self) -> Stamp:
-        """Wall-clock time since the Unix epoch."""
+        """Return the wall-clock time since the Unix epoch."""
 
 
 class SystemClock:
@@ -24,7 +24,7 @@ class SystemClock:
 
 
 class ManualClock:
-    """A clock that stands where it is put."""
+    """A clock that shows the time that it is set to."""
 
     def __init__(self, ns: int = 0) -> None:
         self.ns = ns

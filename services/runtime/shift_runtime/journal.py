@@ -1,8 +1,8 @@
 """The journal: one SQLite file in which a service commits everything at once.
 
-State, how far the inputs were read, outgoing facts (numbered 1, 2, 3 ... per session) and the answers
-of commands go in one transaction, before anything is published or replied. So a service can die at any
-moment: what was acknowledged is here, and what is here is applied once.
+State, cursors of the inputs, outgoing facts (numbered 1, 2, 3 ... per session) and the answers of commands are written
+in one transaction, before anything is published or replied. So a service may die at any moment: once a request is
+answered, its data survives, and each input is applied once.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from shift_runtime.claim import mesh_id
 from shift_runtime.journal_schema import migrate, schema_version
 
 LOG_PAGES, PAGE_BYTES = 1000, 4096
-"""SQLite's own: after so many pages in the log there is a checkpoint, and it begins at its start again."""
+"""SQLite's defaults: after so many pages in the log, a checkpoint runs and the log is overwritten from its start."""
 AnswerKey = tuple[str, str, str]
-"""Session, procedure, command id."""
+"""A session, a procedure and a command id."""
 
 
 @dataclass(frozen=True)
 class StoredAnswer:
-    """What was asked the first time a command's id was used, and its result."""
+    """The content of the first command with its id, and its result."""
 
     content: str
-    """As JSON; a journal of version 0.1.0 kept :func:`digest_of` it."""
+    """The command's content as JSON. A journal of version 0.1.0 has :func:`digest_of` it instead."""
     result: str
-    """As JSON."""
+    """The result as JSON."""
     seq: int = 0
-    """Where the result is a fact in the outbox: its number there. It is not written twice."""
+    """The number of the fact that is the result, which is not stored twice; 0 if the result is not a fact."""
 
 
 @dataclass
 class Batch:
-    """What one commit holds."""
+    """The content of one commit."""
 
     states: dict[str, str] = field(default_factory=dict)
     cursors: dict[tuple[str, str], int] = field(default_factory=dict)
@@ -55,33 +55,34 @@ class Batch:
 
 
 def digest_of(content: str) -> str:
-    """Return the fingerprint of a command's content that a journal of version 0.1.0 kept."""
+    """Return the digest of a command's content that a journal of version 0.1.0 stored."""
     return hashlib.sha256(content.encode()).hexdigest()[:32]
 
 
 def _index(subject: str, fields: tuple[str, ...]) -> str:
-    """Names come from the code, never from a message."""
+    """Return the statement for a subject's index. Names come from the code, never from a message."""
     columns = "".join(f", json_extract(payload, '$.{name}')" for name in fields)
     return f"CREATE INDEX IF NOT EXISTS outbox_{subject} ON outbox (session{columns}) WHERE subject = '{subject}'"
 
 
 def same_content(before: str, now: str) -> bool:
-    """Return whether two contents of a command are the same; ``before`` may be a digest."""
+    """Return whether two contents of a command are equal; ``before`` may be a digest."""
     if before == now or before == digest_of(now):
         return True
     return before.startswith("{") and not differences(before, now)
 
 
 class Journal:
-    """One service's journal. Not for several threads."""
+    """The journal of one service. It must be used from one thread."""
 
     def __init__(self, path: Path, owner: str, lookups: Mapping[str, tuple[str, ...]] | None = None) -> None:
-        """Open or make the file.
+        """Open the file, or create it; bring an older one to the current schema.
 
         Parameters
         ----------
         lookups
-            By subject, the fields by which :meth:`recorded` finds its facts; an index is kept for each.
+            By subject, the fields by which :meth:`recorded` finds its facts. Each has an index, which is
+            derived from the facts and thus not part of the schema's version.
 
         Raises
         ------
@@ -107,17 +108,17 @@ class Journal:
             self._grow_log()
         except (sqlite3.Error, OSError) as e:
             what = (
-                "it is damaged, perhaps since its data folder was copied while a mesh used it; copy it again"
+                "it is damaged, perhaps because its data folder was copied while a mesh used it; copy it again"
                 if isinstance(e, sqlite3.DatabaseError) and not isinstance(e, sqlite3.OperationalError)
                 else "set SHIFT_DATA to a folder for it"
             )
             raise InvalidSettings(f"the journal {path} cannot be opened: {e}; {what}") from e
         self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
         self._answered: dict[str, set[tuple[str, str]]] = {}
-        """Procedures and ids of the commands that were carried out, of the sessions where somebody asked."""
+        """Procedures and ids of the commands that were carried out, by session; read when first needed."""
 
     def _heads(self) -> dict[str, int]:
-        """Return each session's last number; one look-up a session, so that a long study's rows are not all read."""
+        """Return each session's last number. One look-up per session avoids reading all rows of a long study."""
         return dict(
             self._db.execute(
                 "SELECT session, (SELECT MAX(seq) FROM outbox WHERE outbox.session = state.session) AS head"
@@ -126,9 +127,9 @@ class Journal:
         )
 
     def _check_copy(self) -> None:
-        """Look through a file that is a copy, once: one that was copied while it was written can be damaged.
+        """Check a file that is a copy, once: a file that was copied while it was written can be damaged.
 
-        Measured: 0.13 s for 94 MB. A file in its old place is not looked through; its log sees to it.
+        Measured: 0.13 s for 94 MB. A file in its old place needs no check, because SQLite's log protects it.
         """
         found = os.stat(self.path)
         place = f"{found.st_dev}:{found.st_ino}"
@@ -145,8 +146,8 @@ class Journal:
     def _grow_log(self) -> None:
         """Give the write-ahead log its full length now: a commit that overwrites syncs faster than one that appends.
 
-        Measured: 330 us a commit, 420 us without. It is as long as SQLite lets it become before a checkpoint; pages of
-        a transaction that is taken back spill into it and count for nothing.
+        Measured: 330 us per commit, 420 us without. The full length is SQLite's limit before a checkpoint. The pages of
+        a transaction that is rolled back fill the log and have no effect.
         """
         try:
             self._db.execute("PRAGMA cache_size = 10")
@@ -155,7 +156,7 @@ class Journal:
             self._db.execute("INSERT INTO room VALUES (zeroblob(?))", (LOG_PAGES * PAGE_BYTES,))
             with open(f"{self.path}-wal", "rb") as log:
                 os.fsync(log.fileno())
-        except (sqlite3.Error, OSError):  # no room for it: then it grows as it must
+        except (sqlite3.Error, OSError):  # no room for it: then the log grows with each commit
             pass
         finally:
             if self._db.in_transaction:
@@ -165,21 +166,21 @@ class Journal:
     # --- reading back ---
 
     def state(self, session: str) -> str | None:
-        """The last committed state of a session."""
+        """Return the last committed state of a session, or None."""
         row = self._db.execute("SELECT data FROM state WHERE session = ?", (session,)).fetchone()
         return row[0] if row and row[0] is not None else None
 
     def sessions(self) -> Iterator[tuple[str, bool]]:
-        """Every session with a state, and whether it is closed."""
+        """Yield every session that has a state, and whether it is closed."""
         yield from ((s, bool(c)) for s, c in self._db.execute("SELECT session, closed FROM state").fetchall())
 
     def cursors(self) -> dict[tuple[str, str], int]:
-        """How far each owner's facts have been read, per (session, owner), of the sessions that are open."""
+        """Return the last sequence number read by session and owner, of the open sessions."""
         rows = self._db.execute("SELECT session, owner, seq FROM cursor").fetchall()
         return {(s, o): n for s, o, n in rows if s not in self._closed}
 
     def answer(self, key: AnswerKey) -> StoredAnswer | None:
-        """The first result of a command, if it was carried out."""
+        """Return the first result of a command, or None if it was not carried out."""
         if key[1:] not in self._commands(key[0]):
             return None
         content, text = self._db.execute(
@@ -199,7 +200,7 @@ class Journal:
         return self._answered[session]
 
     def closed(self, session: str) -> bool:
-        """Whether the session has ended and its recording is finished."""
+        """Return whether the session has ended and its recording is finished."""
         return session in self._closed
 
     def recorded(self, session: str, subject: str, fields: Mapping[str, str | int]) -> list[str]:
@@ -208,7 +209,7 @@ class Journal:
         ``fields`` are those of the subject's look-up, in its order.
         """
         where = "".join(f" AND json_extract(payload, '$.{name}') = ?" for name in fields)
-        index = f"INDEXED BY outbox_{subject}" if subject in self._lookups else ""  # else SQLite goes by the session
+        index = f"INDEXED BY outbox_{subject}" if subject in self._lookups else ""  # else by session only
         rows = self._db.execute(
             f"SELECT seq, payload FROM outbox {index} WHERE session = ? AND subject = '{subject}'{where}",
             (session, *fields.values()),
@@ -218,12 +219,12 @@ class Journal:
     # --- writing ---
 
     def commit(self, batch: Batch) -> None:
-        """Commit all of it or nothing.
+        """Commit the whole batch or nothing.
 
         Raises
         ------
         Unavailable
-            The disk is full or broken; nothing of the batch happened.
+            The disk is full or broken; nothing of the batch was committed.
         """
         with self._transaction():
             self._write(batch)
@@ -236,12 +237,12 @@ class Journal:
             self._answered.pop(session, None)
 
     def check(self) -> None:
-        """Find out whether the disk takes commits, by one that changes nothing of what is kept.
+        """Check that the disk takes commits, with a write that changes nothing.
 
         Raises
         ------
         Unavailable
-            It does not.
+            It takes none.
         """
         with self._transaction():
             self._db.execute(f"PRAGMA user_version = {schema_version(self._db)}")  # SQLite writes it though it is equal
@@ -276,9 +277,9 @@ class Journal:
     # --- the outbox ---
 
     def page(self, query: OutboxQuery, cursors: dict[tuple[str, str], int]) -> OutboxPage:
-        """What a reader has not seen, oldest first per session, at most ``query.limit`` rows.
+        """Return what a reader has not read, oldest first per session, at most ``query.limit`` rows.
 
-        Sessions that ended are told of only when they are asked for by name, or with ``closed``.
+        Closed sessions are included only by name, with ``query.closed``, or for a reader that has begun them.
         """
         rows: list[OutboxRow] = []
         sessions = self._asked(query)

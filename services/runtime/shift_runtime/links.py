@@ -1,9 +1,9 @@
-"""Links: which owners a reader reaches, and making links again that are gone.
+"""Links: which owners a reader reaches, and how lost links are made again.
 
-Processes link directly once they have met at the router. A process that was suspended for longer than the transport's
-lease (10 s) comes back to links that the others have given up, and they are not always made again. So each reader
-knows when each of its owners last answered it. One that does not, and answers by the router, has lost its link: then
-the bus is opened anew. One that answers nobody is hung or away: then nothing is done, for it would help nobody.
+Processes link directly once they have met at the router. When a process was suspended for longer than the transport's
+lease (10 s), the others have dropped their links to it, and Zenoh does not always make them again. So each reader knows
+when each owner last answered it. If an owner answers through the router only, the direct link is lost and the bus is
+reopened. If an owner does not answer at all, it hangs or has stopped, and reopening the bus would not help.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from shift_runtime.bus.protocol import Bus
 log = structlog.get_logger()
 
 SILENT_S = 2.5
-"""An owner that has not answered for so long is unreached; chosen: five pulls, and the pause of a restart."""
+"""After so long without an answer an owner is unreached; chosen: five pulls, and the pause of a restart."""
 REOPEN_PAUSE_S = 3.0
-"""Between two attempts to make links again; chosen: a new session meets the others within half a second."""
+"""The time between two attempts to reopen the bus; chosen: a new session meets the others within half a second."""
 
 
 @dataclass
@@ -33,30 +33,30 @@ class Links:
     bus: Bus
     owners: tuple[str, ...]
     lost: Callable[[str], None] = lambda owner: None
-    """Told of each owner that is not reached any more."""
+    """Called with each owner that is not reached any more."""
     now: Callable[[], float] = time.monotonic
     answered_at: dict[str, float] = field(default_factory=dict)
     _known_lost: set[str] = field(default_factory=set)
     _reopened_at: float = 0.0
 
     def answered(self, owner: str) -> None:
-        """An owner answered."""
+        """Note that an owner answered."""
         self.answered_at[owner] = self.now()
         if owner in self._known_lost:
             self._known_lost.discard(owner)
             log.info("an owner answers again", owner=owner)
 
     def silent_s(self, owner: str) -> float:
-        """How long ago an owner last answered, s; 0 for one that never did: it may still be starting."""
+        """Return the seconds since an owner last answered; 0 for one that never did, which may still be starting."""
         return self.now() - self.answered_at.get(owner, self.now())
 
     @property
     def unreached(self) -> list[str]:
-        """The owners that have answered before and do not any more."""
+        """The owners that have answered before and do not answer any more."""
         return [owner for owner in self.owners if self.silent_s(owner) > SILENT_S]
 
     async def keep(self, pull: Callable[[str], Awaitable[bool]]) -> None:
-        """Look after the links, once; called after each round of pulls. ``pull`` asks an owner directly."""
+        """Check the links once; it is called after each round of pulls. ``pull`` asks an owner directly."""
         unreached = self.unreached
         for owner in unreached:
             if owner not in self._known_lost:
@@ -72,9 +72,9 @@ class Links:
                 return
 
     async def _reopen(self, owner: str) -> None:
-        log.warning("the link to an owner is gone, and it answers by the router: links are made again", owner=owner)
+        log.warning("the link to an owner is lost, and it answers through the router: the bus is reopened", owner=owner)
         self._reopened_at = self.now()
         try:
             await self.bus.reopen()
         except InvalidSettings as e:
-            log.error("links cannot be made again", error=e.detail)
+            log.error("the bus cannot be reopened", error=e.detail)

@@ -1,4 +1,4 @@
-"""Structured logs on standard error, one line an event, with the service's name in each."""
+"""Structured logs on standard error: one line per event, with the service's name."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shift_runtime.settings import MeshSettings
 
 
 def configure_logs(service: str, settings: MeshSettings) -> None:
-    """Set up structlog for this process."""
+    """Configure structlog for this process."""
     level = logging.getLevelNamesMapping()[settings.log_level.upper()]
     renderer: Any = (
         structlog.processors.JSONRenderer()

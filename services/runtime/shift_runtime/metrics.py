@@ -1,14 +1,14 @@
-"""Metrics of one process, in a registry of its own; the gateway gathers them all under ``/metrics``."""
+"""The metrics of one process, in its own registry. The gateway merges them under ``/metrics``."""
 
 from __future__ import annotations
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, disable_created_metrics, generate_latest
 
-disable_created_metrics()  # type: ignore[no-untyped-call] # a second series per counter, that nobody asks for
+disable_created_metrics()  # type: ignore[no-untyped-call] # a second series per counter, which nobody uses
 
 
 class Metrics:
-    """The counters that every service keeps; label ``service`` on each."""
+    """The counters of a service; each has the label ``service``."""
 
     def __init__(self, service: str) -> None:
         self.service = service
@@ -37,37 +37,37 @@ class Metrics:
         return Counter(name, text, ("service", *labels), registry=self.registry)
 
     def dropped(self, reason: str, count: int = 1) -> None:
-        """A message was dropped."""
+        """Count dropped messages."""
         self._dropped.labels(self.service, reason).inc(count)
 
     def published(self, subject: str) -> None:
-        """A fact was committed and published."""
+        """Count a fact that was committed and published."""
         self._facts.labels(self.service, subject).inc()
 
     def read(self, subject: str) -> None:
-        """A fact of another service was taken in."""
+        """Count a fact of another service that was read."""
         self._read.labels(self.service, subject).inc()
 
     def answered(self, procedure: str, outcome: str) -> None:
-        """A command was answered."""
+        """Count a command that was answered."""
         self._commands.labels(self.service, procedure, outcome).inc()
 
     def link_lost(self, owner: str) -> None:
-        """An owner does not answer any more."""
+        """Count an owner that does not answer any more."""
         self._links_lost.labels(self.service, owner).inc()
 
     def silent(self, owner: str, seconds: float) -> None:
-        """How long ago an owner last answered."""
+        """Set how long ago an owner last answered, in seconds."""
         self._silent.labels(self.service, owner).set(seconds)
 
     def commit_failed(self) -> None:
-        """The disk refused a commit."""
+        """Count a commit that the disk refused."""
         self._failed.labels(self.service).inc()
 
     def sessions(self, count: int) -> None:
-        """How many sessions are in memory."""
+        """Set how many sessions are in memory."""
         self._sessions.set(count)
 
     def text(self) -> bytes:
-        """The exposition text."""
+        """Return the metrics in Prometheus' text format."""
         return generate_latest(self.registry)

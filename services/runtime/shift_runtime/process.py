@@ -1,4 +1,4 @@
-"""Running a service as a process: settings, logs, bus, journal, signals; one line in ``__main__``."""
+"""A service as a process: settings, logs, bus, journal and signals."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from shift_runtime.settings import MeshSettings, read_settings
 
 log = structlog.get_logger()
 OWNED_ELSEWHERE = 3
-"""Exit code of a service that found another mesh on its router: to start it again does not help."""
+"""Exit code of a service that found another mesh on its router; a restart would not help."""
 
 
 class Extend(Protocol):
@@ -37,7 +37,11 @@ class Extend(Protocol):
 
 
 def run_service(core: Core[Any], extend: Extend | None = None) -> None:
-    """Run a service until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that are not valid."""
+    """Run a service until SIGINT or SIGTERM, then exit with 0.
+
+    Settings or a data folder that are not valid give exit code 2, and another mesh on the router
+    :data:`OWNED_ELSEWHERE`; the reason is written to standard error.
+    """
     try:
         settings = read_settings()
         configure_logs(core.name, settings)
@@ -52,7 +56,7 @@ def run_service(core: Core[Any], extend: Extend | None = None) -> None:
 
 
 def run_loop(main: Coroutine[Any, Any, None]) -> None:
-    """``asyncio.run`` on uvloop, which takes 50 us less to wake for a message; where there is none, on asyncio's."""
+    """Run a coroutine on uvloop, which wakes 50 us sooner for a message, or on asyncio's loop without it."""
     try:
         import uvloop
     except ImportError:  # Windows
@@ -62,14 +66,14 @@ def run_loop(main: Coroutine[Any, Any, None]) -> None:
 
 
 def leave() -> NoReturn:
-    """End the process, all being done: a Zenoh session that could not be closed would hold it for ever."""
+    """End the process once everything is done: a Zenoh session that could not be closed would block its exit."""
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(0)
 
 
 async def serve(core: Core[Any], settings: MeshSettings, extend: Extend | None = None) -> None:
-    """The service on its bus, until a signal."""
+    """Run the service on its bus until a signal."""
     journal = Journal(settings.data / "state" / f"{core.name}.sqlite", core.name, core.lookups)
     bus = await ZenohBus.open(settings.zenoh, settings.listen)
     extended = partial(extend, settings=settings) if extend is not None else None

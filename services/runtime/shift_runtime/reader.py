@@ -1,8 +1,8 @@
-"""The reader: one way to read another service's facts, for every service, door and recorder.
+"""The reader: how every service, gateway and bridge reads the facts of another service.
 
-The live publication is a hint. A reader takes exactly cursor + 1 of each owner and session, and pulls
-what it misses from the owner's outbox: at the start, at once on a gap, every half second, and when it
-is asked to. So nothing is missed and nothing is read twice, whatever the network does.
+A publication is only a notification. A reader accepts exactly the fact cursor + 1 of each owner and session, and pulls
+the others from the owner's outbox: at the start, at once on a gap, every half second, and on request. So no fact is
+missed or read twice, whatever the network does.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
 FIRST_WAIT_S, FIRST_PAUSE_S = 1.0, 0.05
 """How long the session owner is asked at the start before the others are read without it; chosen: a short start."""
-SESSION_OWNER = OWNER_OF[Session.subject]
+SESSION_OWNER = Session.owner
 """The owner whose facts say that a session exists."""
 REPLAY_MARK = b"replay:"
-"""Before the sequence of what is replayed: tools that listen hear it, a reader passes over it."""
+"""The prefix of a replayed fact's sequence number. Tools that listen receive it; a reader ignores it."""
 
 
 @dataclass(frozen=True)
 class ReadFact:
-    """A fact in its turn."""
+    """A fact that was read, in its owner's order."""
 
     owner: str
     seq: int
@@ -45,7 +45,7 @@ class ReadFact:
 
 
 def fact_of(row: OutboxRow) -> Fact:
-    """The fact of an outbox row. Raises :class:`MalformedMessage`."""
+    """Return the fact of an outbox row. Raise :class:`MalformedMessage` for an invalid row."""
     kind = FACTS.get(row.subject)
     if kind is None:
         raise MalformedMessage(f"{row.subject!r} is not a subject of this mesh")
@@ -57,10 +57,10 @@ def fact_of(row: OutboxRow) -> Fact:
 
 @dataclass
 class Reader:
-    """Reads ``owners`` through ``bus`` and hands each fact, in its owner's order, to ``deliver``.
+    """Reads the facts of ``owners`` and passes each one to ``deliver``, in its owner's order.
 
-    ``cursors`` is (session, owner) -> last sequence delivered; it starts where the caller had read to.
-    ``dropped`` is told the reason of each publication that was no fact.
+    ``cursors`` holds the last sequence number delivered by session and owner; it starts where the caller had read to.
+    ``dropped`` is called with the reason for each publication that is not a valid fact.
     """
 
     bus: Bus
@@ -69,31 +69,31 @@ class Reader:
     deliver: Callable[[ReadFact], None]
     dropped: Callable[[str], None]
     closed: bool = False
-    """Whether sessions that ended are read as well."""
+    """Whether ended sessions are read as well."""
     done: set[str] = field(default_factory=set)
-    """Sessions of which nothing more is read."""
+    """Sessions that are not read any more."""
     synced: set[str] = field(default_factory=set)
     """Owners whose outbox was read to its end at least once."""
     pages: dict[str, OutboxPage] = field(default_factory=dict)
     misfits: dict[tuple[str, str], str] = field(default_factory=dict)
-    """Owner and session -> a sentence, where the owner's journal is older than what was read of it."""
+    """By owner and session, a sentence if the owner's journal is older than what was read of it."""
     lost: Callable[[str], None] = lambda owner: None
-    """Told of each owner that does not answer any more."""
+    """Called with each owner that does not answer any more."""
     _pulls: dict[tuple[str, str | None], asyncio.Task[bool]] = field(default_factory=dict)
     _again: set[tuple[str, str | None]] = field(default_factory=set)
 
     def __post_init__(self) -> None:
-        """Know the links to the owners."""
+        """Set up the links to the owners."""
         self.links = Links(self.bus, self.owners, lambda owner: self.lost(owner))
 
     def start(self) -> None:
-        """Listen to the hints."""
+        """Subscribe to the notifications."""
         for owner in self.owners:
             for subject in OWNERS[owner]:
-                self.bus.subscribe(f"{ROOT}/*/{subject}", self._hint)
+                self.bus.subscribe(f"{ROOT}/*/{subject}", self._on_notification)
 
     async def run(self) -> None:
-        """Pull every owner for ever, the recorder first: no session is known before it said so."""
+        """Pull every owner without end. The owner of sessions comes first, since no session is known before."""
         if SESSION_OWNER in self.owners:
             await poll(lambda: self.pull(SESSION_OWNER), timeout_s=FIRST_WAIT_S, pause_s=FIRST_PAUSE_S)
         while True:
@@ -102,16 +102,16 @@ class Reader:
             await asyncio.sleep(PULL_EVERY_S)
 
     def forget(self, session: str) -> None:
-        """Read nothing more of a session that has ended."""
+        """Stop reading a session that has ended."""
         self.done.add(session)
         for owner in self.owners:
             self.cursors.pop((session, owner), None)
 
-    def _hint(self, incoming: Incoming) -> None:
+    def _on_notification(self, incoming: Incoming) -> None:
         try:
             key = parse_key(incoming.key)
             if not isinstance(key, FactKey):
-                raise MalformedMessage(f"{incoming.key} is not the key of an event")
+                raise MalformedMessage(f"{incoming.key} is not the key of a fact")
             number = incoming.attachment.removeprefix(REPLAY_MARK)
             if not number.isdigit() or len(number) > 15:
                 raise MalformedMessage(f"a message of {key.subject} has no sequence number")
@@ -143,7 +143,7 @@ class Reader:
         self.deliver(read)
 
     def pull_soon(self, owner: str, session: str | None = None) -> asyncio.Task[bool]:
-        """Pull in the background; what is asked for while a pull is under way gets one more after it."""
+        """Pull in the background; a request during a pull causes one more pull after it."""
         key = (owner, session)
         running = self._pulls.get(key)
         if running is not None and not running.done():
@@ -154,11 +154,11 @@ class Reader:
         return task
 
     async def pull(self, owner: str, session: str | None = None) -> bool:
-        """Read the owner's outbox to its end; whether it answered."""
+        """Read the owner's outbox to its end; return whether it answered."""
         return await asyncio.shield(self.pull_soon(owner, session))
 
     async def pull_all(self, owners: Iterable[str], session: str | None = None) -> tuple[str, ...]:
-        """Pull several; those that did not answer."""
+        """Pull several owners; return those that did not answer."""
         wanted = [o for o in owners if o in self.owners]
         answered = await asyncio.gather(*(self.pull(o, session) for o in wanted))
         return tuple(o for o, ok in zip(wanted, answered, strict=True) if not ok)
@@ -173,7 +173,7 @@ class Reader:
     async def _pull(self, owner: str, session: str | None) -> bool:
         knows_sessions = owner == SESSION_OWNER or SESSION_OWNER in self.synced or SESSION_OWNER not in self.owners
         past: dict[str, int] = {}
-        """Heads of sessions that are done: an owner that has not closed them offers them from their start."""
+        """Heads of sessions that are done: an owner that has not closed them yet would send them from their start."""
         while True:
             cursors = {s: n for (s, o), n in self.cursors.items() if o == owner and session in (None, s)}
             query = OutboxQuery(
@@ -192,13 +192,13 @@ class Reader:
             if session is not None:
                 self.pages[f"{owner}/{session}"] = page
             if page.complete:
-                if session is None and knows_sessions:  # else a session's facts may have been held back
+                if session is None and knows_sessions:  # otherwise a session's facts may have been deferred
                     self.synced.add(owner)
                 return True
 
     def _compare(self, owner: str, page: OutboxPage, asked: Mapping[str, int]) -> None:
-        """Notice a journal that is older than what was read of it: its folder was copied while a mesh used it."""
-        for session, read in asked.items():  # as it was when the page was asked for: hints may have come meanwhile
+        """Report a journal that is older than what was read of it: its folder was copied while a mesh used it."""
+        for session, read in asked.items():  # as of the request: notifications may have come meanwhile
             head = page.heads.get(session, 0)
             if read <= head:
                 self.misfits.pop((owner, session), None)
@@ -212,7 +212,7 @@ class Reader:
                 log.error("journals do not fit together", detail=said)
 
     def _taken(self, owner: str, page: OutboxPage) -> bool:
-        """Take a page in; whether to go on. What is held back is asked for later, not again and again."""
+        """Deliver a page; return whether to continue. Deferred facts are requested later, not at once."""
         try:
             for row in page.rows:
                 self._take(owner, row)

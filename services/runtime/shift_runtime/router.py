@@ -1,6 +1,6 @@
-"""The router: where the processes of the mesh meet. A Zenoh session in router mode is the Rust router.
+"""The router, at which the processes of the mesh meet. A Zenoh session in router mode is the Rust router.
 
-``python -m shift_runtime.router`` listens on ``SHIFT_ROUTER_LISTEN`` until it is told to stop.
+``python -m shift_runtime.router`` listens on ``SHIFT_ROUTER_LISTEN`` until SIGINT or SIGTERM.
 """
 
 from __future__ import annotations

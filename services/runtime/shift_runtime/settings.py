@@ -1,4 +1,4 @@
-"""Settings of every process, read once at its start: flags, else environment (``SHIFT_...``), else default."""
+"""The settings of every process, read once at its start from flags, the environment (``SHIFT_...``) or defaults."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from shift_runtime.endpoints import parse_endpoint
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
 LOG_LEVELS = ("debug", "info", "warning", "error")
 _OTHER_NAMES = {"warn": "warning", "fatal": "error", "critical": "error"}
-"""What ROS 2 and Python's logging call them."""
+"""The names of log levels in ROS 2 and in Python's logging."""
 
 
 def _log_level(value: object) -> object:
@@ -40,14 +40,14 @@ Endpoint = Annotated[str, AfterValidator(_endpoint)]
 
 
 class MeshSettings(BaseSettings):
-    """What every process of the mesh needs to know."""
+    """The settings of every process of the mesh."""
 
     model_config = SettingsConfigDict(env_prefix="SHIFT_", frozen=True, extra="ignore")
 
-    zenoh: Endpoint = Field(default=DEFAULT_ROUTER, description="Endpoint of the router that the mesh meets at.")
+    zenoh: Endpoint = Field(default=DEFAULT_ROUTER, description="Endpoint of the router of the mesh.")
     listen: Endpoint = Field(
         default="tcp/127.0.0.1:0",
-        description="Where this process takes direct links of its peers; empty: everything goes by the router.",
+        description="Endpoint at which this process accepts direct links; empty: everything goes through the router.",
     )
     data: Path = Field(default=Path("data"), description="Folder of recordings, studies and journals.")
     log_level: LogLevel = Field(default="info", description="debug, info, warning or error.")
@@ -55,7 +55,7 @@ class MeshSettings(BaseSettings):
 
 
 def read_settings(kind: type[MeshSettings] = MeshSettings, **given: object) -> MeshSettings:
-    """Return the settings; ``given`` (flags) comes before the environment. Raises :class:`InvalidSettings`."""
+    """Return the settings; ``given`` (flags) overrides the environment. Raise :class:`InvalidSettings`."""
     try:
         return kind(**{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]
     except ValidationError as e:

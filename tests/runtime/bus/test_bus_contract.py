@@ -1,4 +1,4 @@
-"""What every bus must give: one suite, run over the in-memory bus and over Zenoh."""
+"""The contract of every bus: one suite for the in-memory bus and for Zenoh."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ async def answered(bus: Bus, key: str, count: int) -> None:
     await until_asked(all_there)
 
 
-async def test_a_publication_reaches_every_subscriber_with_its_bytes_and_its_attachment(open_bus: OpenBus) -> None:
+async def test_publication_reaches_every_subscriber_with_its_bytes_and_attachment(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[Incoming] = []
     at_home: list[Incoming] = []
@@ -46,7 +46,7 @@ async def test_a_publication_reaches_every_subscriber_with_its_bytes_and_its_att
     assert heard == at_home == [Incoming("a/b/c", EVERY_BYTE, b"17")]
 
 
-async def test_an_empty_payload_and_no_attachment_arrive_as_empty_bytes(open_bus: OpenBus) -> None:
+async def test_empty_payload_and_missing_attachment_arrive_as_empty_bytes(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[Incoming] = []
     other.subscribe("a/b", heard.append)
@@ -56,7 +56,7 @@ async def test_an_empty_payload_and_no_attachment_arrive_as_empty_bytes(open_bus
     assert heard == [Incoming("a/b", b"", b"")]
 
 
-async def test_a_star_is_exactly_one_part_of_a_key(open_bus: OpenBus) -> None:
+async def test_star_matches_exactly_one_part_of_a_key(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[str] = []
     other.subscribe("a/*/c", lambda m: heard.append(m.key))
@@ -68,7 +68,7 @@ async def test_a_star_is_exactly_one_part_of_a_key(open_bus: OpenBus) -> None:
     assert heard == ["a/1/c", "a/2/c", "end"]
 
 
-async def test_two_stars_at_the_end_are_any_rest(open_bus: OpenBus) -> None:
+async def test_two_stars_at_the_end_match_any_rest(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[str] = []
     other.subscribe("a/**", lambda m: heard.append(m.key))
@@ -79,7 +79,19 @@ async def test_two_stars_at_the_end_are_any_rest(open_bus: OpenBus) -> None:
     assert heard == ["a/1", "a/1/2/3"]
 
 
-async def test_publications_of_one_bus_arrive_in_their_order(open_bus: OpenBus) -> None:
+async def test_star_matches_no_part_that_begins_with_an_at_sign(open_bus: OpenBus) -> None:
+    one, other = await pair(open_bus)
+    heard: list[str] = []
+    for key in ("a/**", "a/*/c", "a/@b/**", "end"):
+        other.subscribe(key, lambda m, key=key: heard.append(f"{key} {m.key}"))
+    await asyncio.sleep(0.1)
+    for key in ("a/@b/c", "end"):
+        one.put(key, b"")
+    await until(lambda: "end end" in heard)
+    assert heard == ["a/@b/** a/@b/c", "end end"]
+
+
+async def test_publications_of_one_bus_arrive_in_order(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[int] = []
     other.subscribe("n/*", lambda m: heard.append(int(m.payload)))
@@ -109,12 +121,12 @@ async def test_handlers_run_in_the_loop_one_at_a_time_and_never_within_put(open_
     assert inside == [False]
 
 
-async def test_a_request_to_nobody_is_an_empty_list(open_bus: OpenBus) -> None:
+async def test_request_without_a_server_returns_no_replies(open_bus: OpenBus) -> None:
     one, _ = await pair(open_bus)
     assert await one.get("nobody/there", b"?", timeout_s=5.0) == []
 
 
-async def test_a_request_and_its_reply_carry_their_bytes_exactly(open_bus: OpenBus) -> None:
+async def test_request_and_reply_carry_their_bytes_exactly(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     asked: list[Request] = []
 
@@ -129,7 +141,7 @@ async def test_a_request_and_its_reply_carry_their_bytes_exactly(open_bus: OpenB
     assert [(r.key, r.payload) for r in asked] == [("shift/s1/rpc/echo", EVERY_BYTE)]
 
 
-async def test_a_server_hears_its_own_bus(open_bus: OpenBus) -> None:
+async def test_server_receives_requests_of_its_own_bus(open_bus: OpenBus) -> None:
     bus = await open_bus()
     bus.serve("own", lambda r: r.reply(b"mine"))
     await answered(bus, "own", 1)
@@ -145,14 +157,14 @@ async def test_two_servers_under_one_key_both_reply(open_bus: OpenBus) -> None:
     assert {(r.ok, r.payload) for r in replies} == {(True, b"one"), (False, b"other")}
 
 
-async def test_a_refusal_is_a_reply_that_is_not_ok(open_bus: OpenBus) -> None:
+async def test_refusal_is_a_reply_that_is_not_ok(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     other.serve("no", lambda r: r.refuse(b"because"))
     await answered(one, "no", 1)
     assert await one.get("no", timeout_s=5.0) == [Reply(False, b"because")]
 
 
-async def test_only_the_first_of_reply_and_refuse_counts(open_bus: OpenBus) -> None:
+async def test_only_the_first_reply_or_refusal_counts(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
 
     def say_twice(request: Request) -> None:
@@ -165,14 +177,14 @@ async def test_only_the_first_of_reply_and_refuse_counts(open_bus: OpenBus) -> N
     assert await one.get("first", timeout_s=5.0) == [Reply(True, b"first")]
 
 
-async def test_a_reply_may_come_later_from_outside_the_handler(open_bus: OpenBus) -> None:
+async def test_reply_may_come_later_from_outside_the_handler(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     other.serve("later", lambda r: asyncio.get_running_loop().call_later(0.05, r.reply, b"now"))
     await answered(one, "later", 1)
     assert await one.get("later", timeout_s=5.0) == [Reply(True, b"now")]
 
 
-async def test_a_server_that_says_nothing_gives_no_reply_and_may_still_speak_when_nobody_waits(
+async def test_silent_server_gives_no_reply_and_may_still_reply_when_nobody_waits(
     open_bus: OpenBus,
 ) -> None:
     one, other = await pair(open_bus)
@@ -191,7 +203,7 @@ async def _asked(bus: Bus, silent: list[Request]) -> bool:
 
 
 async def half_silent(open_bus: OpenBus) -> Bus:
-    """A bus; of the two servers under ``half``, one replies ``here`` and the other says nothing."""
+    """Return a bus with two servers under ``half``: one replies ``here`` and the other never replies."""
     one, other = await pair(open_bus)
     silent: list[Request] = []
     one.serve("half", silent.append)
@@ -206,13 +218,13 @@ async def half_silent(open_bus: OpenBus) -> Bus:
     return one
 
 
-async def test_what_others_replied_counts_when_one_says_nothing(open_bus: OpenBus) -> None:
+async def test_replies_of_others_count_when_one_server_is_silent(open_bus: OpenBus) -> None:
     one = await half_silent(open_bus)
     assert await one.get("half", timeout_s=0.3) == [Reply(True, b"here")]
 
 
-async def test_a_request_can_end_with_the_reply_that_is_enough(open_bus: OpenBus) -> None:
-    """Nobody waits for a server that says nothing once another has said what was asked for."""
+async def test_request_ends_with_the_reply_that_is_enough(open_bus: OpenBus) -> None:
+    """A silent server is not awaited once another one has answered."""
     one = await half_silent(open_bus)
     loop = asyncio.get_running_loop()
     begun = loop.time()
@@ -220,7 +232,7 @@ async def test_a_request_can_end_with_the_reply_that_is_enough(open_bus: OpenBus
     assert loop.time() - begun < 30.0  # not a matter of speed: it does not wait for the time to be over
 
 
-async def test_the_first_answer_is_the_first_reply_that_can_be_read(open_bus: OpenBus) -> None:
+async def test_first_answer_is_the_first_readable_reply(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     one.serve("twice", lambda r: r.reply(b"a stranger's"))
     other.serve("twice", lambda r: asyncio.get_running_loop().call_later(0.05, r.reply, b"7"))
@@ -233,7 +245,7 @@ async def test_the_first_answer_is_the_first_reply_that_can_be_read(open_bus: Op
     assert await first_answer(one, "nobody", timeout_s=5.0, read=number) is None
 
 
-async def test_beyond_the_limit_arrivals_are_dropped_and_counted(open_bus: OpenBus) -> None:
+async def test_arrivals_beyond_the_limit_are_dropped_and_counted(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[bytes] = []
     other.subscribe("flood", lambda m: heard.append(m.payload), limit=3)
@@ -248,7 +260,7 @@ async def test_beyond_the_limit_arrivals_are_dropped_and_counted(open_bus: OpenB
     assert other.dropped == 7
 
 
-async def test_one_subscriber_s_flood_is_not_another_s_loss(open_bus: OpenBus) -> None:
+async def test_flood_of_one_subscriber_loses_nothing_of_another(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     many: list[bytes] = []
     few: list[bytes] = []
@@ -265,11 +277,11 @@ async def test_one_subscriber_s_flood_is_not_another_s_loss(open_bus: OpenBus) -
 
 
 def _hold_the_loop(seconds: float) -> None:
-    """A handler that takes its time: meanwhile nothing is taken from what waits."""
+    """While a handler runs, no waiting request is taken."""
     time.sleep(seconds)
 
 
-async def test_a_request_beyond_the_limit_is_dropped_and_counted(open_bus: OpenBus) -> None:
+async def test_request_beyond_the_limit_is_dropped_and_counted(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     other.serve("busy", lambda r: r.reply(b"yes"), limit=0)
     await until_asked(lambda: _dropped(one, other))
@@ -283,7 +295,7 @@ async def _dropped(one: Bus, other: Bus) -> bool:
     return other.dropped > 0
 
 
-async def test_what_is_taken_back_is_not_heard_nor_asked_any_more(open_bus: OpenBus) -> None:
+async def test_closed_handle_receives_nothing_more(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[str] = []
     subscribed = other.subscribe("a", lambda m: heard.append(m.key))
@@ -298,7 +310,7 @@ async def test_what_is_taken_back_is_not_heard_nor_asked_any_more(open_bus: Open
     assert heard == []
 
 
-async def test_a_bus_that_was_opened_anew_hears_and_answers_as_before(open_bus: OpenBus) -> None:
+async def test_reopened_bus_receives_and_answers_as_before(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     heard: list[bytes] = []
     one.subscribe("shift/v1/s1/marker", lambda incoming: heard.append(incoming.payload))
@@ -321,7 +333,7 @@ async def test_a_bus_that_was_opened_anew_hears_and_answers_as_before(open_bus: 
         assert [reply.payload for reply in await one.get("shift/v1/s1/rpc/mark", timeout_s=1.0)] == [b"yes"]
 
 
-async def test_an_owner_is_found_by_the_router_as_long_as_it_is_there(router: str) -> None:
+async def test_owner_is_found_through_the_router_while_it_lives(router: str) -> None:
     owner, asking = await ZenohBus.open(router, "tcp/127.0.0.1:0"), await ZenohBus.open(router, "tcp/127.0.0.1:0")
     key = "shift/v1/@service/monitor/health"
     owner.serve(key, lambda request: request.reply(b"{}"))
@@ -331,7 +343,7 @@ async def test_an_owner_is_found_by_the_router_as_long_as_it_is_there(router: st
     await asking.close()
 
 
-async def test_a_bus_that_left_answers_nothing(open_bus: OpenBus) -> None:
+async def test_closed_bus_answers_nothing(open_bus: OpenBus) -> None:
     one, other = await pair(open_bus)
     other.serve("b", lambda r: r.reply(b"yes"))
     other.token("shift/v1/@service/monitor/alive")
@@ -341,7 +353,7 @@ async def test_a_bus_that_left_answers_nothing(open_bus: OpenBus) -> None:
     await other.close()
 
 
-async def test_a_token_is_there_for_as_long_as_its_bus(router: str) -> None:
+async def test_token_lives_as_long_as_its_bus(router: str) -> None:
     key = "shift/v1/@service/learner/alive"
     bus = await ZenohBus.open(router, "tcp/127.0.0.1:0")
     watcher = await asyncio.to_thread(zenoh.open, zenoh_config("client", connect=router))
@@ -366,7 +378,7 @@ async def test_a_token_is_there_for_as_long_as_its_bus(router: str) -> None:
 @pytest.mark.parametrize(
     ("connect", "listen"), [("nonsense", ""), ("tcp/127.0.0.1:1", "nonsense"), ("tcp/127.0.0.1:1", "tcp/nowhere")]
 )
-async def test_an_endpoint_that_is_none_is_a_mistake_in_the_settings(connect: str, listen: str) -> None:
+async def test_invalid_endpoint_is_an_error_in_the_settings(connect: str, listen: str) -> None:
     with pytest.raises(InvalidSettings, match=r"SHIFT_LISTEN is '.*': ") as found:
         await ZenohBus.open(connect, listen)
     assert ".rs:" not in found.value.detail

@@ -1,4 +1,4 @@
-"""A worker whose handler hangs: it goes silent, though its process, its session and its token live on."""
+"""A worker whose core hangs: it answers nothing, though its process, its bus and its token stay."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from support.worker_rig import CORE, Notes
 
 
 class Hanging(threading.Thread):
-    """A worker in a thread and a loop of its own; a decision about the task ``hang`` hangs until it is let go."""
+    """A worker in its own thread and loop. A decision about the task ``hang`` hangs until :attr:`let_go` is set."""
 
     def __init__(self, router: str, path: Path) -> None:
         super().__init__()
@@ -53,7 +53,7 @@ class Hanging(threading.Thread):
 
 
 @pytest.mark.anyio
-async def test_a_hung_handler_silences_its_health_and_its_outbox_though_the_token_stays(
+async def test_hung_worker_answers_neither_health_nor_outbox_though_its_token_stays(
     router: str, tmp_path: Path
 ) -> None:
     hanging = Hanging(router, tmp_path / "decider.sqlite")

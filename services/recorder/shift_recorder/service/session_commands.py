@@ -47,7 +47,7 @@ class SessionCommands:
         ------
         Unavailable
             There is no room for the recording, or its folder cannot be written.
-        UnknownThing, MalformedMessage
+        InvalidStudy
             The study does not exist or is not valid.
         """
         if not isinstance(message, StartSession):

@@ -1,1 +1,1 @@
-"""The bus between services: its protocol, Zenoh and one in memory."""
+"""The bus between services: its protocol, over Zenoh and in memory."""

@@ -1,4 +1,4 @@
-"""The in-memory bus: the same handlers, no network. For tests of a whole mesh in one process."""
+"""The in-memory bus: the same handlers without a network, for tests of a whole mesh in one process."""
 
 from __future__ import annotations
 
@@ -14,16 +14,21 @@ T = TypeVar("T")
 
 
 def matches(expression: str, key: str) -> bool:
-    """Whether a key expression (``*`` is any one part, ``**`` at its end any rest) takes in ``key``."""
+    """Return whether a key expression matches ``key``, as in Zenoh.
+
+    ``*`` matches any one part and ``**`` at the end any rest, but neither matches a part that begins with ``@``.
+    """
     parts, wanted = key.split("/"), expression.split("/")
     if wanted[-1] == "**":
         wanted = wanted[:-1] + ["*"] * (len(parts) - len(wanted) + 1)
-    return len(parts) == len(wanted) and all(w in ("*", p) for w, p in zip(wanted, parts, strict=True))
+    return len(parts) == len(wanted) and all(
+        w == p or (w == "*" and not p.startswith("@")) for w, p in zip(wanted, parts, strict=True)
+    )
 
 
 @dataclass
 class Hub:
-    """Where the in-memory buses of one process meet."""
+    """The meeting point of the in-memory buses of one process."""
 
     subscribers: list[tuple[str, Callable[[Incoming], None]]] = field(default_factory=list)
     servers: list[tuple[str, Callable[[Request], None]]] = field(default_factory=list)
@@ -105,10 +110,10 @@ class MemoryBus:
         return self._held(lambda: self._hub.tokens.discard(key))
 
     async def reopen(self) -> None:
-        """See :class:`~shift_runtime.bus.protocol.Bus`: there are no links here that could be gone."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. This bus has no links that could be lost."""
 
     async def answers_by_router(self, key: str) -> bool:
-        """See :class:`~shift_runtime.bus.protocol.Bus`: there is no router here."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. This bus has no router."""
         return False
 
     @property
@@ -139,7 +144,7 @@ class MemoryBus:
         return handle
 
     def _later(self, handler: Callable[[T], None], limit: int) -> Callable[[T], None]:
-        """The handler, to be run by the loop in its own time, as from a network."""
+        """Return a function that lets the loop run the handler later, as a network does."""
         loop = asyncio.get_running_loop()
         waiting = 0
 

@@ -1,8 +1,8 @@
-"""The bus: what every transport gives, and nothing of any one transport.
+"""The bus: the interface that every transport implements.
 
-Handlers run in the event loop that opened the bus, one at a time. A publication is a hint: it may be
-lost, and the journal's reader does without it. A request gets the replies that came within its time;
-an empty list means that nobody is there.
+Handlers run in the event loop that opened the bus, one at a time. A publication is a notification: it may be lost, and
+the reader of a journal works without it. A request returns the replies that came within its time; an empty list means
+that no server exists.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Incoming:
-    """A publication as it arrived. Nothing about it has been checked."""
+    """A publication as it arrived, unchecked."""
 
     key: str
     payload: bytes
@@ -25,7 +25,7 @@ class Incoming:
 
 @dataclass(frozen=True)
 class Reply:
-    """One reply to a request: an answer, or a refusal."""
+    """One reply to a request: an answer or a refusal."""
 
     ok: bool
     payload: bytes
@@ -36,71 +36,74 @@ class Request(Protocol):
 
     @property
     def key(self) -> str:
-        """The key that was asked."""
+        """The key under which it was sent."""
 
     @property
     def payload(self) -> bytes:
-        """What was sent along; nothing about it has been checked."""
+        """The payload as it arrived, unchecked."""
 
     def reply(self, payload: bytes) -> None:
-        """Answer."""
+        """Answer with a result."""
 
     def refuse(self, payload: bytes) -> None:
         """Answer with an error."""
 
 
 class Handle(Protocol):
-    """Something declared on the bus."""
+    """A declaration on the bus."""
 
     def close(self) -> None:
-        """Take it back."""
+        """Withdraw the declaration."""
 
 
 class Bus(Protocol):
     """A transport."""
 
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
-        """Publish; never blocks, and drops rather than wait for a slow subscriber."""
+        """Publish a message. It never blocks: where a subscriber is slow, the message is dropped."""
 
     async def get(
         self, key: str, payload: bytes = b"", *, timeout_s: float, enough: Callable[[Reply], bool] | None = None
     ) -> list[Reply]:
-        """Ask; every reply that came within ``timeout_s``, up to the first that is ``enough``."""
+        """Send a request; return the replies within ``timeout_s`` seconds, up to the first that is ``enough``."""
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
-        """Hear what is published under ``key`` (``*`` is any one part); beyond ``limit`` waiting, it is dropped."""
+        """Receive what is published under ``key``, where ``*`` matches any one part.
+
+        Messages are dropped and counted while ``limit`` of them wait for the handler.
+        """
 
     def serve(self, key: str, handler: Callable[[Request], None], *, limit: int = 10_000) -> Handle:
-        """Be asked under ``key``."""
+        """Receive requests under ``key``. Requests are dropped and counted while ``limit`` of them wait."""
 
     def token(self, key: str) -> Handle:
-        """Show that this process is alive, for as long as it is."""
+        """Declare a token that exists as long as this process."""
 
     async def reopen(self) -> None:
-        """Leave and join again, with all that was declared: links that are gone are made anew.
+        """Leave and join again with everything that was declared, so that lost links are made again.
 
-        Requests that are under way may get no answer; whoever asked asks again.
+        Requests that are under way may get no reply; their senders repeat them.
         """
 
     async def answers_by_router(self, key: str) -> bool:
-        """Return whether somebody answers under ``key`` to one who is linked to the router only."""
+        """Return whether a server under ``key`` answers a client that is linked to the router only."""
 
     @property
     def joined(self) -> bool:
-        """Whether there is any link, to the router or to another process."""
+        """Whether any link exists, to the router or to another process."""
 
     @property
     def dropped(self) -> int:
-        """How many arrivals were dropped because too many were waiting."""
+        """How many messages and requests were dropped because too many were waiting."""
 
     async def close(self) -> None:
-        """Take everything back and leave."""
+        """Withdraw every declaration and leave."""
 
 
 async def first_answer(
     bus: Bus, key: str, payload: bytes = b"", *, timeout_s: float, read: Callable[[Reply], T | None]
 ) -> T | None:
-    """Ask; what ``read`` makes of the first reply that it can make something of, without waiting for others."""
+    """Send a request; return what ``read`` returns for the first reply that it can read, without waiting for others."""
     found: T | None = None
 
     def enough(reply: Reply) -> bool:

@@ -1,9 +1,10 @@
 """The bus over Zenoh.
 
-Peer mode with explicit endpoints and gossip: processes meet at the router and then link directly, so
-that a router that dies is missed by newcomers only. No multicast: it does not cross a bridge network.
-Callbacks run in Zenoh's own threads (``indirect=False``), copy the bytes and hand over to the loop.
-Measured (DESIGN.md): 122 us a request that way, 365 us with the default callback.
+Peer mode with explicit endpoints and gossip: processes meet at the router and then link directly, so that a router's
+failure affects new processes only. There is no multicast, because it does not cross a bridge network.
+
+Callbacks run in Zenoh's own threads (``indirect=False``), copy the bytes and pass them to the loop. Measured
+(DESIGN.md): 122 us per request that way, 365 us with the default callback.
 """
 
 from __future__ import annotations
@@ -25,21 +26,21 @@ from shift_runtime.bus.zenoh_config import zenoh_config
 
 T = TypeVar("T")
 CLOSE_WITHIN_S = 2.0
-"""Peers that go at the same moment can hold a session's close for ten seconds; nothing hangs on it by then."""
+"""How long a close is awaited. Peers that leave at the same moment can delay it for ten seconds, without effect."""
 
 BY_ROUTER_S = 1.0
-"""How long an owner that does not answer directly has to answer by the router."""
+"""How long an owner that does not answer directly may take to answer through the router."""
 
 NO_REPLY = (b"", b"Timeout")
-"""What Zenoh itself puts in the place of a reply that did not come in time."""
+"""The payloads that Zenoh itself sends in place of a reply that did not come in time."""
 _attached = threading.local()
 
 
 def direct(handle: Callable[[T], None], drop: Callable[[], None] | None = None) -> Callback[T]:
-    """``handle`` as a callback in Zenoh's own thread, one of a few, which keeps its Python thread state from then on.
+    """Return ``handle`` as a callback that runs in Zenoh's own thread, which keeps its Python thread state.
 
-    Else CPython makes one for each call and takes it apart again: measured, 14 us of 217 a request, 50 of 733 where
-    the processes had slept for 30 ms. One ``PyGILState_Ensure`` more than is released is what keeps it.
+    Otherwise CPython makes and destroys a thread state for each call. Measured: 14 us of 217 us per request, and 50 us
+    of 733 us where the processes had slept for 30 ms. One ``PyGILState_Ensure`` without a release keeps the state.
     """
 
     def run(item: T) -> None:
@@ -52,7 +53,7 @@ def direct(handle: Callable[[T], None], drop: Callable[[], None] | None = None) 
 
 
 class _Gate:
-    """Lets items over from Zenoh's thread into the loop, at most ``limit`` waiting; counts the rest."""
+    """Passes items from Zenoh's threads to the loop. While ``limit`` items wait, others are dropped and counted."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -77,7 +78,7 @@ class _Gate:
                 waiting += 1
             try:
                 self._loop.call_soon_threadsafe(run, item)
-            except RuntimeError:  # the loop is closed: the process is going
+            except RuntimeError:  # the loop is closed: the process is ending
                 return
 
         return enqueue
@@ -91,7 +92,7 @@ class _Request:
 
     def reply(self, payload: bytes) -> None:
         if self.query is not None:
-            with contextlib.suppress(zenoh.ZError):  # its session was left meanwhile: who asked asks again
+            with contextlib.suppress(zenoh.ZError):  # its session was closed meanwhile: the sender repeats the request
                 self.query.reply(self.key, payload)
             self._done()
 
@@ -109,7 +110,7 @@ class _Request:
 
 @dataclass
 class _Handle:
-    """Something declared, and how to declare it on another session."""
+    """A declaration, and how to make it on another session."""
 
     declare: Callable[[zenoh.Session], Any]
     thing: Any
@@ -124,8 +125,53 @@ class _Handle:
             self.thing = self.declare(session)
 
 
+class _Replies:
+    """The replies to one request, passed from Zenoh's threads to the loop until the last one or one that is enough."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop, enough: Callable[[Reply], bool] | None) -> None:
+        self._loop = loop
+        self._enough = enough
+        self._replies: list[Reply] = []
+        self._done: asyncio.Future[None] = loop.create_future()
+
+    async def all(self, timeout_s: float) -> list[Reply]:
+        """Return the replies once the request has ended, after ``timeout_s`` at the latest."""
+        limit = self._loop.call_later(timeout_s, self._end)
+        try:
+            await self._done
+        finally:
+            limit.cancel()
+        return self._replies
+
+    def on_reply(self, reply: zenoh.Reply) -> None:
+        """Receive a reply, in a thread of Zenoh's."""
+        if reply.ok is not None:
+            self._pass_on(self._take, Reply(True, reply.ok.payload.to_bytes()))
+        elif reply.err is not None and (said := reply.err.payload.to_bytes()) not in NO_REPLY:
+            self._pass_on(self._take, Reply(False, said))
+
+    def on_end(self) -> None:
+        """Receive the end of the replies, in a thread of Zenoh's."""
+        self._pass_on(self._end)
+
+    def _pass_on(self, handle: Callable[..., None], *arguments: Reply) -> None:
+        if not self._done.done():  # replies after the last one wake nobody
+            with contextlib.suppress(RuntimeError):  # the loop is closed: the process is ending
+                self._loop.call_soon_threadsafe(handle, *arguments)
+
+    def _take(self, reply: Reply) -> None:
+        if not self._done.done():
+            self._replies.append(reply)
+            if self._enough is not None and self._enough(reply):
+                self._done.set_result(None)
+
+    def _end(self) -> None:
+        if not self._done.done():
+            self._done.set_result(None)
+
+
 class ZenohBus:
-    """One Zenoh session. Make it by :meth:`open` within the loop that its handlers are to run in."""
+    """One Zenoh session. Create it with :meth:`open` in the loop in which its handlers run."""
 
     def __init__(
         self, session: zenoh.Session, loop: asyncio.AbstractEventLoop, connect: str = "", listen: str = ""
@@ -139,12 +185,12 @@ class ZenohBus:
 
     @classmethod
     async def open(cls, connect: str, listen: str = "") -> ZenohBus:
-        """Open a session. A router that is not there yet is tried again in the background.
+        """Open a session. A router that does not run yet is tried again in the background.
 
         Raises
         ------
         InvalidSettings
-            An endpoint is none, or cannot be listened on.
+            An endpoint is not valid, or it cannot be listened on.
         """
         try:
             session = await _opened(connect, listen)
@@ -167,44 +213,16 @@ class ZenohBus:
         self, key: str, payload: bytes = b"", *, timeout_s: float, enough: Callable[[Reply], bool] | None = None
     ) -> list[Reply]:
         """See :class:`~shift_runtime.bus.protocol.Bus`."""
-        replies: list[Reply] = []
-        done: asyncio.Future[None] = self._loop.create_future()
-
-        def end() -> None:
-            if not done.done():
-                done.set_result(None)
-
-        def take(reply: Reply) -> None:
-            if not done.done():
-                replies.append(reply)
-                if enough is not None and enough(reply):
-                    done.set_result(None)
-
-        def hand_over(handle: Callable[..., None], *arguments: Reply) -> None:
-            if not done.done():  # nobody is woken for what comes after enough
-                with contextlib.suppress(RuntimeError):  # the loop is closed: the process is going
-                    self._loop.call_soon_threadsafe(handle, *arguments)
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                hand_over(take, Reply(True, reply.ok.payload.to_bytes()))
-            elif reply.err is not None and (said := reply.err.payload.to_bytes()) not in NO_REPLY:
-                hand_over(take, Reply(False, said))
-
+        replies = _Replies(self._loop, enough)
         self.session.get(
             key,
-            direct(on_reply, lambda: hand_over(end)),
+            direct(replies.on_reply, replies.on_end),
             payload=payload or None,
             timeout=timeout_s,
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-        limit = self._loop.call_later(timeout_s + 0.5, end)
-        try:
-            await done
-        finally:
-            limit.cancel()
-        return replies
+        return await replies.all(timeout_s + 0.5)
 
     def subscribe(self, key: str, handler: Callable[[Incoming], None], *, limit: int = 10_000) -> Handle:
         """See :class:`~shift_runtime.bus.protocol.Bus`."""
@@ -233,7 +251,7 @@ class ZenohBus:
         return self._held(lambda session: session.liveliness().declare_token(key))
 
     async def reopen(self) -> None:
-        """See :class:`~shift_runtime.bus.protocol.Bus`. The new session is there before the old one goes."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. The new session is open before the old one closes."""
         async with self._moving:
             try:
                 session = await _opened(self._connect, self._listen)
@@ -245,7 +263,7 @@ class ZenohBus:
             _leave(left, lambda: None)
 
     async def answers_by_router(self, key: str) -> bool:
-        """See :class:`~shift_runtime.bus.protocol.Bus`. As a client, which has no other link."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. It asks as a client, which has no other link."""
         return await asyncio.to_thread(_answers, self._connect, key)
 
     @property
@@ -259,7 +277,7 @@ class ZenohBus:
         return self._gate.dropped
 
     async def close(self) -> None:
-        """See :class:`~shift_runtime.bus.protocol.Bus`. A session that stays open hangs the process at its exit."""
+        """See :class:`~shift_runtime.bus.protocol.Bus`. An open session would block the process at its exit."""
         for handle in self._handles:
             with contextlib.suppress(zenoh.ZError):
                 handle.close()
@@ -267,7 +285,7 @@ class ZenohBus:
         closed = asyncio.Event()
 
         def done() -> None:
-            with contextlib.suppress(RuntimeError):  # the loop did not wait for us
+            with contextlib.suppress(RuntimeError):  # the loop did not wait
                 self._loop.call_soon_threadsafe(closed.set)
 
         _leave(self.session, done)
@@ -286,10 +304,10 @@ async def _opened(connect: str, listen: str) -> zenoh.Session:
 
 
 def _leave(session: zenoh.Session, then: Callable[[], None]) -> None:
-    """Close a session in a thread of its own: peers that go at the same moment can hold it for ten seconds."""
+    """Close a session in its own thread: peers that leave at the same moment can delay it for ten seconds."""
 
     def close() -> None:
-        with contextlib.suppress(zenoh.ZError):  # "timed out": a peer went at the same moment
+        with contextlib.suppress(zenoh.ZError):  # "timed out": a peer left at the same moment
             session.close()  # type: ignore[no-untyped-call]
         then()
 

@@ -1,4 +1,4 @@
-"""How Zenoh is configured here: explicit endpoints and gossip, no multicast, quick to connect again."""
+"""The configuration of Zenoh: explicit endpoints and gossip, no multicast, quick reconnection."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import zenoh
 
 
 def zenoh_config(mode: str, *, connect: str = "", listen: str = "", timeout_ms: int = -1) -> zenoh.Config:
-    """A configuration without any scouting; ``mode`` is peer, client or router.
+    """Return a configuration without multicast; ``mode`` is peer, client or router.
 
-    ``timeout_ms`` is how long to try to connect at the start; -1 is for ever, for a peer in the background.
+    ``timeout_ms`` is how long Zenoh tries to connect at the start. With -1 it tries without end; a peer does so in the
+    background.
     """
     config = zenoh.Config()
     entries: dict[str, Any] = {

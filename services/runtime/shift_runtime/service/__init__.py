@@ -1,1 +1,1 @@
-"""What runs one service's core over bus and journal."""
+"""The worker that runs a service's core over bus and journal, and its parts."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 from shift_schemas.core_protocol import Step
-from shift_schemas.messages import Fact, Message
+from shift_schemas.messages import Fact
 from shift_schemas.timestamps import Stamp
 
 S = TypeVar("S")
@@ -40,5 +40,3 @@ class Core(Generic[S]):
     """Turns a request's message into what the core steps on, given the facts that were recorded before."""
     lookups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """By subject of its own, the fields by which ``recall`` finds facts."""
-    streams: Mapping[str, type[Message]] = field(default_factory=dict)
-    """By stream that the service owns, the message that its payloads are decoded as."""

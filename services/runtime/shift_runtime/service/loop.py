@@ -85,7 +85,7 @@ class Worker(Generic[S]):
         self.alarm = DiskAlarm(journal.check, self.enqueue)
         self.transactions = Transactions(journal, self.states, self.progress, self.alarm, metrics, self.enqueue)
         self.waiting = Waiting(core.name, self.reader, self.tasks, self.enqueue)
-        self.requests = Requests(core.name, core.streams, bus, journal, metrics, self.waiting.join, self.enqueue)
+        self.requests = Requests(core.name, bus, journal, metrics, self.waiting.join, self.enqueue)
         self.notifications = Notifications(bus, metrics)
         self.endpoints = ServiceEndpoints(
             core.name, bus, journal, metrics, self.reader, self.progress, self.claim, self.alarm, self.states,

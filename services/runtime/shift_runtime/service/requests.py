@@ -11,8 +11,8 @@ from shift_schemas.codec import decode, encode
 from shift_schemas.conflicts import repeat_conflict
 from shift_schemas.errors import MalformedMessage, Problem, ShiftError
 from shift_schemas.keys import ROOT, CommandKey, StreamKey, parse_key
-from shift_schemas.messages import Command, Message
-from shift_schemas.registry import COMMANDS, PROCEDURES, STREAMS
+from shift_schemas.messages import Command, Message, StreamItem
+from shift_schemas.registry import COMMANDS, STREAM_ITEMS
 
 from shift_runtime.bus.protocol import Bus, Incoming, Request
 from shift_runtime.journal import AnswerKey, StoredAnswer, same_content
@@ -70,8 +70,6 @@ class Requests:
 
     Parameters
     ----------
-    streams
-        By stream that the service owns, the message that its payloads are decoded as.
     join
         Adds a command to an equal one that is parked; returns whether there was one.
     """
@@ -79,7 +77,6 @@ class Requests:
     def __init__(
         self,
         service: str,
-        streams: Mapping[str, type[Message]],
         bus: Bus,
         answers: StoredAnswers,
         metrics: Metrics,
@@ -87,7 +84,6 @@ class Requests:
         deliver: Callable[[PendingRequest], None],
     ) -> None:
         self._service = service
-        self._streams = streams
         self._bus = bus
         self._answers = answers
         self._metrics = metrics
@@ -96,11 +92,11 @@ class Requests:
 
     def declare(self) -> None:
         """Receive the commands and the streams that the service owns."""
-        for procedure in PROCEDURES.get(self._service, ()):
-            self._bus.serve(f"{ROOT}/*/rpc/{procedure}", self._on_command)
-        for stream, owner in STREAMS.items():
-            if owner == self._service:
-                kind = self._streams[stream]
+        for procedure, command in COMMANDS.items():
+            if command.owner == self._service:
+                self._bus.serve(f"{ROOT}/*/rpc/{procedure}", self._on_command)
+        for stream, kind in STREAM_ITEMS.items():
+            if kind.owner == self._service:
                 key = f"{ROOT}/*/in/{stream}"
                 self._bus.serve(key, partial(self._on_stream_request, kind), limit=STREAM_LIMIT)
                 self._bus.subscribe(key, partial(self._on_stream, kind), limit=STREAM_LIMIT)
@@ -138,7 +134,7 @@ class Requests:
         if not self._join(pending):
             self._deliver(pending)
 
-    def _on_stream_request(self, kind: type[Message], request: Request) -> None:
+    def _on_stream_request(self, kind: type[StreamItem], request: Request) -> None:
         try:
             pending = _chunk(kind, request.key, request.payload)
         except MalformedMessage as e:
@@ -147,7 +143,7 @@ class Requests:
         pending.requests.append(request)
         self._deliver(pending)
 
-    def _on_stream(self, kind: type[Message], incoming: Incoming) -> None:
+    def _on_stream(self, kind: type[StreamItem], incoming: Incoming) -> None:
         try:
             pending = _chunk(kind, incoming.key, incoming.payload)
         except MalformedMessage:
@@ -160,7 +156,7 @@ class Requests:
         request.refuse(encode(Problem.of(error)))
 
 
-def _chunk(kind: type[Message], text: str, payload: bytes) -> PendingRequest:
+def _chunk(kind: type[StreamItem], text: str, payload: bytes) -> PendingRequest:
     key = parse_key(text)
     if not isinstance(key, StreamKey):
         raise MalformedMessage(f"{text} is not the key of a stream")
