@@ -1,4 +1,4 @@
-"""What holds for every learner, and what each claims: formulas recomputed naively, probabilities true."""
+"""Properties of every learner, and the formulas of each, computed again naively."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def all_rows(learner: Learner, where: Context, memory: Any) -> list[Row]:
     return [learner.row(where, memory, i) for i in range(len(state_names(learner, where)))]
 
 
-def test_every_name_of_the_interface_has_a_learner() -> None:
+def test_every_learner_name_has_a_learner() -> None:
     assert set(NAMES) == set(LearnerName.__args__)  # type: ignore[attr-defined]
     with pytest.raises(InvalidStudy, match="there is no learner 'x'"):
         learner_named("x")
@@ -48,7 +48,7 @@ def test_every_name_of_the_interface_has_a_learner() -> None:
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("interactions", [0, 60])
 @pytest.mark.parametrize("prior", [True, False])
-def test_rows_are_distributions_and_memory_comes_back_exactly(name: str, interactions: int, prior: bool) -> None:
+def test_rows_are_distributions_and_memory_survives_json_exactly(name: str, interactions: int, prior: bool) -> None:
     where, learner = context(name, scoring_prior=prior), LEARNERS[name]
     memory, _ = lived(learner, where, interactions)
     rows = all_rows(learner, where, memory)
@@ -63,7 +63,7 @@ def test_rows_are_distributions_and_memory_comes_back_exactly(name: str, interac
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_function_of_a_learner_leaves_the_old_memory_standing(name: str) -> None:
+def test_functions_of_a_learner_do_not_change_the_old_memory(name: str) -> None:
     where, learner = context(name), LEARNERS[name]
     memory, _ = lived(learner, where, 10)
     before = json.dumps(learner.dump(memory))
@@ -73,14 +73,14 @@ def test_a_function_of_a_learner_leaves_the_old_memory_standing(name: str) -> No
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n not in ("scoring", "q-learning")])
-def test_with_the_prior_the_suggestion_is_the_most_probable_at_first(name: str) -> None:
+def test_suggestion_is_the_most_probable_action_at_first_with_the_prior(name: str) -> None:
     where, learner = context(name), LEARNERS[name]
     for triple in range(15, 30):
         row = learner.row(where, learner.initial(where), triple).probabilities
         assert row.index(max(row)) == where.suggestions[triple]
 
 
-def test_epsilon_greedy_is_the_mean_with_the_prior_as_one_result() -> None:
+def test_epsilon_greedy_value_is_the_mean_with_the_prior_as_one_result() -> None:
     where, learner = context("epsilon-greedy", epsilon=0.6), LEARNERS["epsilon-greedy"]
     memory, seen = lived(learner, where, 50)
     for triple in range(30):
@@ -93,7 +93,7 @@ def test_epsilon_greedy_is_the_mean_with_the_prior_as_one_result() -> None:
             assert row.probabilities[action] == pytest.approx(0.6 * 0.5 / 6 + (1 - 0.6 * 0.5) * best)
 
 
-def test_ucb1_is_auers_bound_on_rewards_between_0_and_1() -> None:
+def test_ucb1_value_is_the_bound_of_auer_on_rewards_between_0_and_1() -> None:
     where, learner = context("ucb1", exploration=0.7), LEARNERS["ucb1"]
     memory, seen = lived(learner, where, 300)
     for triple in range(30):
@@ -110,20 +110,20 @@ def test_ucb1_is_auers_bound_on_rewards_between_0_and_1() -> None:
 # --- Thompson sampling: the probability of the largest sample ---
 
 
-def test_two_beta_arms_have_the_closed_form() -> None:
-    """P(X > Y) for X ~ Beta(2, 1), Y ~ Beta(1, 1) is the mean of X, 2/3."""
+def test_chances_of_two_beta_arms_match_the_closed_form() -> None:
+    """P(X > Y) for X ~ Beta(2, 1) and Y ~ Beta(1, 1) is the mean of X, 2/3."""
     assert thompson.chances((2.0, 1.0), (1.0, 1.0)) == pytest.approx([2 / 3, 1 / 3], abs=1e-6)
     assert thompson.chances((1.0,) * 6, (1.0,) * 6) == pytest.approx([1 / 6] * 6, abs=1e-9)
 
 
-def test_beta_chances_are_how_often_sampling_would_choose() -> None:
+def test_beta_chances_match_frequencies_of_sampling() -> None:
     a, b = (3.0, 1.0, 5.5, 2.0, 40.0, 1.0), (2.0, 1.0, 4.0, 9.0, 31.0, 6.0)
     samples = np.random.default_rng(1).beta(a, b, (400_000, 6))
     frequencies = np.bincount(samples.argmax(axis=1), minlength=6) / len(samples)
     assert thompson.chances(a, b) == pytest.approx(frequencies.tolist(), abs=0.004)
 
 
-def test_a_finer_grid_changes_beta_chances_by_less_than_it_says(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_finer_grid_changes_beta_chances_by_less_than_the_stated_error(monkeypatch: pytest.MonkeyPatch) -> None:
     a, b = (90.0, 80.0, 5.0, 1.0, 1.0, 2.5), (12.0, 12.0, 1.0, 5.0, 1.0, 3.0)
     coarse = thompson.chances(a, b)
     monkeypatch.setattr(thompson, "POINTS", 16 * 1024 + 1)
@@ -132,7 +132,7 @@ def test_a_finer_grid_changes_beta_chances_by_less_than_it_says(monkeypatch: pyt
     thompson.chances.cache_clear()
 
 
-def test_normal_chances_are_how_often_sampling_would_choose() -> None:
+def test_normal_chances_match_frequencies_of_sampling() -> None:
     means, deviations = (0.0, 0.1, 0.4, -1.0), (1.0, 0.2, 0.05, 2.0)
     samples = np.random.default_rng(1).normal(means, deviations, (400_000, 4))
     frequencies = np.bincount(samples.argmax(axis=1), minlength=4) / len(samples)
@@ -158,7 +158,7 @@ def test_beta_posteriors_count_per_state_or_per_triple(states: str) -> None:
             assert row.values[action] == pytest.approx(a / (a + b))
 
 
-def test_linear_thompson_is_ridge_regression() -> None:
+def test_linear_thompson_matches_ridge_regression() -> None:
     where, learner = context("linear-thompson", noise=0.3, prior_strength=2.0), LEARNERS["linear-thompson"]
     memory, seen = lived(learner, where, 80)
     prior = np.zeros(11)
@@ -175,11 +175,11 @@ def test_linear_thompson_is_ridge_regression() -> None:
             assert deviations[action] == pytest.approx(sqrt(here @ covariance @ here))
 
 
-# --- a learner of one's own ---
+# --- an additional learner ---
 
 
 class WinStay(Tabular):
-    """Takes what has gone best here, and what was never tried before what went badly."""
+    """Takes the action with the best mean here; an untried action comes before a bad one."""
 
     name = "ucb1"  # a study's learner is one of the interface's names
 
@@ -189,7 +189,7 @@ class WinStay(Tabular):
         return Row(greedy(values), values, list(visits))
 
 
-def test_a_learner_of_twenty_lines_runs_in_the_cores_and_in_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_learner_of_twenty_lines_runs_in_the_cores_and_in_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     from shift_simulator.compare import rewards_of
     from shift_simulator.random_streams import session_seed
     from shift_simulator.session import play
@@ -203,7 +203,7 @@ def test_a_learner_of_twenty_lines_runs_in_the_cores_and_in_simulation(monkeypat
     assert [e.performance.cumulative_reward for e in played] == simulated[:, 0].tolist()
 
 
-# --- studies at their edges ---
+# --- extreme studies ---
 
 SIX = {f"s{i}": {"levels": ["off", "on"], "thresholds": [0.5]} for i in range(6)}
 ROWS = {
@@ -232,7 +232,7 @@ EDGES: list[dict[str, Any]] = [
 
 @pytest.mark.parametrize("edge", EDGES, ids=lambda edge: str(edge)[:40])
 @pytest.mark.parametrize("name", NAMES)
-def test_rows_stay_distributions_at_the_edges_of_what_a_study_can_say(name: str, edge: dict[str, Any]) -> None:
+def test_rows_are_distributions_for_extreme_studies(name: str, edge: dict[str, Any]) -> None:
     settings = {"name": name} | edge.get("learner", {})
     where = Context(Study.model_validate({"study": "s"} | edge | {"learner": settings}))
     learner = LEARNERS[name]

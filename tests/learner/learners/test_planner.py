@@ -37,26 +37,26 @@ def rows(context: Context, memory: Memory) -> list[tuple[list[float], list[float
     return [tuple(PLANNER.row(context, memory, t)) for t in range(30)]
 
 
-def test_before_anything_is_known_it_follows_the_scoring_system_where_capacity_stays_high() -> None:
+def test_planner_without_data_follows_the_scoring_system_at_high_capacity() -> None:
     memory = PLANNER.initial(CONTEXT)
     chosen = [PLANNER.row(CONTEXT, memory, t).probabilities.index(1.0) for t in range(15, 30)]
     assert chosen == list(CONTEXT.suggestions[15:])
 
 
-def test_every_row_is_a_distribution_and_its_best_value_is_the_action_taken() -> None:
+def test_every_row_puts_all_probability_on_its_best_value() -> None:
     for probabilities, values, _ in rows(CONTEXT, lived(CONTEXT, 30)):
         assert sorted(probabilities) == [0, 0, 0, 0, 0, 1]
         assert probabilities.index(1.0) == values.index(max(values))
 
 
-def test_its_memory_comes_back_exactly_from_json() -> None:
+def test_memory_survives_json_exactly() -> None:
     memory = lived(CONTEXT, 40)
     again = PLANNER.load(CONTEXT, json.loads(json.dumps(PLANNER.dump(memory))))
     assert rows(CONTEXT, again) == rows(CONTEXT, memory)
     assert again.history == memory.history
 
 
-def test_under_a_changed_study_the_history_is_folded_again() -> None:
+def test_changed_study_folds_the_history_again() -> None:
     other = Context(Study.model_validate({"study": "s", "capacity": {"recovery": 0.1}, "learner": {"name": "planner"}}))
     memory = lived(CONTEXT, 20)
     assert rows(other, memory) == rows(other, PLANNER.load(other, PLANNER.dump(memory)))
@@ -72,7 +72,7 @@ def test_visits_count_reported_decisions() -> None:
     assert [row[2] for row in rows(CONTEXT, memory)] == counted.tolist()
 
 
-def test_a_study_with_another_strategy_is_planned_for() -> None:
+def test_planner_works_with_an_additional_strategy() -> None:
     column = {"capacity": {"low": {"pointing": 1}, "high": {"pointing": 0}}}
     column["gaze"] = {g: {"pointing": 1} for g in ("distracted", "uncertain", "focused")}
     column["awareness"] = {
@@ -93,7 +93,7 @@ def test_a_study_with_another_strategy_is_planned_for() -> None:
     assert all(sum(row[0]) == 1 and len(row[1]) == 12 for row in rows(context, lived(context, 5)))
 
 
-def test_repeated_failures_turn_it_away_from_a_suggestion() -> None:
+def test_repeated_failures_turn_the_planner_away_from_a_suggestion() -> None:
     memory = PLANNER.initial(CONTEXT)
     triple = 25  # high, focused, unknown: the suggestion is a plain affirmation
     assert CONTEXT.suggestions[triple] == 0
@@ -121,7 +121,7 @@ def naive_beliefs(seen: list[tuple[int, int, bool]]) -> np.ndarray:
     return weights
 
 
-def test_the_posterior_over_preferences_is_bayes_rule() -> None:
+def test_posterior_over_preferences_follows_bayes_rule() -> None:
     people = plausible_people(CONTEXT.study.scoring, CONTEXT.suggestions)
     prior = b.priors(people, CONTEXT.study.learner)
     seen = [(int(RNG.integers(30)), int(RNG.integers(6)), bool(RNG.integers(2))) for _ in range(12)]
@@ -135,7 +135,7 @@ def test_the_posterior_over_preferences_is_bayes_rule() -> None:
 
 
 @pytest.mark.parametrize("strategy", [0, 1])
-def test_columns_suit_what_the_scoring_system_would_suggest_with_those_entries_flipped(strategy: int) -> None:
+def test_columns_suit_the_suggestion_of_the_table_with_flipped_entries(strategy: int) -> None:
     people = plausible_people(CONTEXT.study.scoring, CONTEXT.suggestions)
     unflipped = people.columns[strategy].suits[0].reshape(30, -1)
     assert unflipped.argmax(axis=1).tolist() == [people.levels[a][strategy] for a in CONTEXT.suggestions]
@@ -176,7 +176,7 @@ def naive_values(
     return {cell: expected(*cell, depth) for cell in cells}
 
 
-def test_looking_ahead_is_the_expectation_that_a_recursion_finds() -> None:
+def test_look_ahead_matches_the_expectation_by_recursion() -> None:
     chance = RNG.random((6, 2, 3, 5))
     transitions = RNG.dirichlet(np.ones(3), 3)
     found = outcome_values(
@@ -186,7 +186,7 @@ def test_looking_ahead_is_the_expectation_that_a_recursion_finds() -> None:
         assert found[action, level, gaze, outcome, 0] == pytest.approx(value)
 
 
-def test_the_model_has_the_values_that_capacity_can_take() -> None:
+def test_capacity_model_has_the_values_that_capacity_can_take() -> None:
     model = capacity_model_of(CONTEXT.study)
     assert model.values.tolist() == pytest.approx([i / 10 for i in range(11)])
     assert model.repeated.tolist() == [3, 4, 5, 6, 7, 8, 9, 10, 10, 10, 10]
