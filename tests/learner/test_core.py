@@ -159,9 +159,8 @@ def test_rewards_add_up() -> None:
 
 def test_override_counts_as_taken_is_learned_and_has_no_propensity() -> None:
     state, facts = folded(session(), config(), decision(1, action=3, overridden=True))
-    assert facts[-1].states["unfocused"].probabilities[3] == pytest.approx(1 - 0.75 * 0.99), (
-        "it is taken, so greedy only"
-    )  # type: ignore[attr-defined]
+    row = of_kind(facts[-1:], Policy).states["unfocused"]
+    assert row.probabilities[3] == pytest.approx(1 - 0.75 * 0.99), "an action that was taken has the greedy part only"
     step = core.step(state, report(1, seconds=0.0), NOW)
     transition = of_kind(step.facts, Transition)
     assert transition.propensity is None
