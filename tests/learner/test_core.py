@@ -88,7 +88,7 @@ def folded(*messages: Any) -> tuple[LearnerState, list[Fact]]:
     return state, facts
 
 
-def begun(**learner: Any) -> LearnerState:
+def configured_session(**learner: Any) -> LearnerState:
     """Return the state of a session that has its configuration."""
     return folded(session(), config(**learner))[0]
 
@@ -113,7 +113,7 @@ def test_configuration_publishes_the_first_policy_for_decision_1() -> None:
 
 
 def test_each_decision_and_each_report_publishes_a_policy_with_its_inputs() -> None:
-    state = begun()
+    state = configured_session()
     for message, for_n, seen in (
         (decision(1), 2, Seen(decision=1, config=1)),
         (report(1), 2, Seen(decision=1, performance=1, config=1)),
@@ -173,17 +173,17 @@ def test_override_counts_as_taken_is_learned_and_has_no_propensity() -> None:
 
 def test_report_without_its_decision_waits_for_the_decider_and_is_then_refused() -> None:
     with pytest.raises(InputsMissing) as waiting:
-        core.step(begun(), report(1), NOW)
+        core.step(configured_session(), report(1), NOW)
     assert waiting.value.owners == ("decider",)
     with pytest.raises(UnknownThing, match="no decision d1"):
-        core.step(begun(), report(1), NOW, timed_out=True)
+        core.step(configured_session(), report(1), NOW, timed_out=True)
 
 
 def test_learner_that_lacks_inputs_is_unavailable_instead_of_refusing() -> None:
     with pytest.raises(InputsMissing):
-        core.step(begun(), report(1, decision=1), NOW)
+        core.step(configured_session(), report(1, decision=1), NOW)
     with pytest.raises(Unavailable, match="decider"):
-        core.step(begun(), report(1, decision=1), NOW, timed_out=True)
+        core.step(configured_session(), report(1, decision=1), NOW, timed_out=True)
     bare, _ = folded(session())
     with pytest.raises(InputsMissing) as waiting:
         core.step(bare, report(1), NOW)
@@ -327,7 +327,7 @@ def messages_of(history: list[Any]) -> list[Any]:
 @given(histories, st.sampled_from([0.0, 0.5, 1.0]), st.floats(0, 1), st.booleans())
 def test_values_match_a_naive_loop(history: list[Any], discount: float, rate: float, prior: bool) -> None:
     naive = Naive(rate, discount, [[float(prior and a == s) for a in range(6)] for s in range(6)])
-    state = begun(discount=discount, learning_rate=rate, scoring_prior=prior)
+    state = configured_session(discount=discount, learning_rate=rate, scoring_prior=prior)
     names = Study(study="x").scoring.states
     decided, taken = 0, set()
     for message in [*messages_of(history), session("ending")]:
@@ -451,7 +451,7 @@ def test_correction_without_a_report_is_refused() -> None:
 
 
 def test_number_of_correctable_reports_is_bounded() -> None:
-    state = begun(name="scoring")
+    state = configured_session(name="scoring")
     for n in range(1, core.CORRECTABLE + 3):
         state, _ = core.step(state, decision(n), NOW).state, None
         state = core.step(state, report(n), NOW).state

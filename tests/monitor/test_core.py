@@ -28,8 +28,8 @@ from support.monitor_sessions import (
     NEGATION,
     NOW,
     RECORDINGS,
-    began,
     config,
+    configured_session,
     decision,
     fixations,
     fold,
@@ -60,7 +60,7 @@ def test_any_cut_of_the_same_samples_gives_identical_results(cuts: list[int], st
         (chunk,) = chunks(taken[at : at + n], n)
         parts.append(chunk.model_copy(update={"seq": seq}))
         seq, at = seq + 1, at + n
-    cut, cut_facts = fold(began(), *parts, session("ending"))
+    cut, cut_facts = fold(configured_session(), *parts, session("ending"))
     assert cut.attention == whole.attention
     assert spans(cut_facts) == spans(facts)
     assert last(cut_facts).gaze == last(facts).gaze
@@ -77,8 +77,10 @@ def test_any_cut_of_the_same_names_gives_identical_results(gaze: list[tuple[int,
         now += wait_ms / 1000
         t.append(now)
     aoi = [name for _, name in gaze]
-    whole, _ = fold(began(), names(0, t, aoi))
-    cut, _ = fold(began(), *(names(seq, t[i : i + n], aoi[i : i + n]) for seq, i in enumerate(range(0, len(t), n))))
+    whole, _ = fold(configured_session(), names(0, t, aoi))
+    cut, _ = fold(
+        configured_session(), *(names(seq, t[i : i + n], aoi[i : i + n]) for seq, i in enumerate(range(0, len(t), n)))
+    )
     assert cut.attention == whole.attention
 
 
@@ -173,7 +175,7 @@ def test_every_applied_input_publishes_one_observation_of_the_next_version(seed:
 
 def test_facts_carry_the_given_stamp() -> None:
     stamp = Stamp(sec=5, nsec=6)
-    done = step(began(), names(0, [0.0], ["left"]), stamp)
+    done = step(configured_session(), names(0, [0.0], ["left"]), stamp)
     assert {f.stamp for f in done.facts} == {stamp}
 
 
@@ -195,7 +197,7 @@ def test_first_configuration_publishes_the_first_observation() -> None:
 
 
 def test_later_configuration_changes_settings_and_keeps_the_partner_model() -> None:
-    state, _ = fold(began(), decision(1), names(0, [0.0, 0.2], ["left", "left"]))
+    state, _ = fold(configured_session(), decision(1), names(0, [0.0, 0.2], ["left", "left"]))
     after, facts = fold(state, config(study(capacity={"threshold": 0.95}), version=2))
     assert after.attention == state.attention
     assert last(facts).capacity.value == pytest.approx(0.9)
@@ -218,7 +220,7 @@ def test_message_before_the_configuration_waits(event: Message) -> None:
 
 
 def test_message_of_another_kind_changes_nothing() -> None:
-    state = began()
+    state = configured_session()
     done = step(state, Marker(session="s1", stamp=NOW, marker_id="m1", text="hm"), NOW)
     assert (done.state, done.facts) == (state, ())
     assert step(state, session(), NOW).facts == ()
@@ -226,7 +228,7 @@ def test_message_of_another_kind_changes_nothing() -> None:
 
 def test_end_of_a_session_ends_the_open_fixation_and_refuses_more_gaze() -> None:
     t = [i / 100 for i in range(50)]
-    state, facts = fold(began(), points(0, t, [0.5] * 50), session("ending"))
+    state, facts = fold(configured_session(), points(0, t, [0.5] * 50), session("ending"))
     assert len(fixations(facts)) == 1
     assert fold(state, session("ended"))[1] == []
     with pytest.raises(Conflict, match="has ended"):

@@ -14,7 +14,7 @@ from shift_schemas.messages import (
 from support.monitor_sessions import (
     NOW,
     Recorded,
-    began,
+    configured_session,
     fixations,
     fold,
     last,
@@ -31,31 +31,31 @@ def test_gaze_is_recorded_as_it_was_applied() -> None:
     chunk = GazeChunk(
         source="a", seq=0, t=[0.0, 0.1, 0.2], x=[0.1, None, 0.3], y=[0.2, 0.9, 0.4], valid=[True, False, False]
     )
-    state, facts = fold(began(), chunk)
+    state, facts = fold(configured_session(), chunk)
     gaze = facts[0]
     assert isinstance(gaze, Gaze)
     assert (gaze.x, gaze.y, gaze.valid) == ([0.1, 0.0, 0.0], [0.2, 0.0, 0.0], [True, False, False])
     assert gaze.aoi == []
-    assert fold(began(), gaze_chunk_of(gaze)) == (state, facts)
+    assert fold(configured_session(), gaze_chunk_of(gaze)) == (state, facts)
 
 
 def test_gaze_on_no_aoi_is_recorded_as_an_empty_name() -> None:
-    state, facts = fold(began(), names(0, [0.0, 0.1], ["left", None]))
+    state, facts = fold(configured_session(), names(0, [0.0, 0.1], ["left", None]))
     gaze = facts[0]
     assert isinstance(gaze, Gaze)
     assert (gaze.aoi, gaze.x, gaze.valid) == (["left", ""], [], [])
-    assert fold(began(), gaze_chunk_of(gaze)) == (state, facts)
+    assert fold(configured_session(), gaze_chunk_of(gaze)) == (state, facts)
 
 
 def test_sample_without_valid_is_valid_where_x_and_y_are_given() -> None:
-    _, facts = fold(began(), GazeChunk(source="a", seq=0, t=[0.0, 0.1], x=[0.1, 0.2], y=[0.2, None]))
+    _, facts = fold(configured_session(), GazeChunk(source="a", seq=0, t=[0.0, 0.1], x=[0.1, 0.2], y=[0.2, None]))
     assert isinstance(facts[0], Gaze)
     assert facts[0].valid == [True, False]
 
 
 def test_gaze_is_uncertain_before_the_first_valid_sample_on_an_aoi() -> None:
     one = study(aois=[{"name": "cup", "rectangle": [0.0, 0.0, 0.5, 1.0]}])
-    state, facts = fold(began(one), points(0, [0.0, 0.01], [None, 0.9]))
+    state, facts = fold(configured_session(one), points(0, [0.0, 0.01], [None, 0.9]))
     assert last(facts).gaze.category == "uncertain"
     _, facts = fold(state, points(1, [0.02], [0.2]))
     assert last(facts).gaze.category == "uncertain"  # no dwell yet
@@ -69,14 +69,14 @@ def test_gaze_is_uncertain_before_the_first_valid_sample_on_an_aoi() -> None:
 def test_repeated_chunk_gets_the_same_reply_and_is_ignored() -> None:
     chunk = names(0, [0.0, 0.1], ["left", "left"])
     recorded = Recorded()
-    state, facts = fold(began(), chunk, names(1, [0.2], ["right"]), recorded=recorded)
+    state, facts = fold(configured_session(), chunk, names(1, [0.2], ["right"]), recorded=recorded)
     again = step(state, gaze_input(chunk, recorded), NOW)
     assert (again.state, again.facts, again.repeat) == (state, (), True)
     assert again.result == {"accepted": 2, "source": "ros", "seq": 0, "observation": last(facts).version}
 
 
 def test_missing_chunks_are_counted() -> None:
-    state, facts = fold(began(), names(2, [0.0], ["left"]))
+    state, facts = fold(configured_session(), names(2, [0.0], ["left"]))
     assert last(facts).gaze.dropped == 2
     _, facts = fold(state, names(6, [0.1], ["left"]))
     assert last(facts).gaze.dropped == 5
@@ -85,7 +85,7 @@ def test_missing_chunks_are_counted() -> None:
 
 def test_late_chunk_is_recorded_and_not_applied_and_its_repeat_is_ignored() -> None:
     recorded = Recorded()
-    state, before = fold(began(), names(0, [0.0], ["left"]), names(3, [0.3], ["left"]), recorded=recorded)
+    state, before = fold(configured_session(), names(0, [0.0], ["left"]), names(3, [0.3], ["left"]), recorded=recorded)
     done = step(state, names(1, [0.1], ["right"]), NOW)
     recorded.gaze += [f for f in done.facts if isinstance(f, Gaze)]
     gaze, observation = done.facts
@@ -106,7 +106,7 @@ def test_late_chunk_is_recorded_and_not_applied_and_its_repeat_is_ignored() -> N
 def test_late_chunk_is_recorded_in_each_of_two_hundred_gaps() -> None:
     recorded = Recorded()
     read = [names(2 * n + 1, [float(n)], ["left"]) for n in range(200)]
-    state, _ = fold(began(), *read, recorded=recorded)
+    state, _ = fold(configured_session(), *read, recorded=recorded)
     late = [names(2 * n, [n - 0.5], ["right"]) for n in range(200)]
     after, facts = fold(state, *late, recorded=recorded)
     outcomes = [f.outcome for f in facts if isinstance(f, Gaze)]
@@ -117,7 +117,7 @@ def test_late_chunk_is_recorded_in_each_of_two_hundred_gaps() -> None:
 
 def test_new_source_replaces_the_former_one() -> None:
     t = [i / 100 for i in range(50)]
-    state, _ = fold(began(), points(4, [100 + s for s in t], [0.2] * 50, source="old"))
+    state, _ = fold(configured_session(), points(4, [100 + s for s in t], [0.2] * 50, source="old"))
     state, facts = fold(state, names(0, [0.0], ["right"], source="new"))
     assert [type(f).__name__ for f in facts] == ["Gaze", "Fixation", "Observation"]
     assert [f.source for f in fixations(facts)] == ["old"]
@@ -127,7 +127,7 @@ def test_new_source_replaces_the_former_one() -> None:
 
 
 def test_source_can_change_from_points_to_names() -> None:
-    state, _ = fold(began(), points(0, [i / 100 for i in range(50)], [0.2] * 50, source="a"))
+    state, _ = fold(configured_session(), points(0, [i / 100 for i in range(50)], [0.2] * 50, source="a"))
     state, facts = fold(state, names(1, [0.5, 0.7], ["right", "right"], source="a"))
     assert len(fixations(facts)) == 1
     assert last(facts).gaze.aoi == "right"
@@ -136,7 +136,7 @@ def test_source_can_change_from_points_to_names() -> None:
 
 
 def test_time_that_does_not_rise_is_refused() -> None:
-    state, _ = fold(began(), names(0, [0.0, 0.5], ["left", "left"]))
+    state, _ = fold(configured_session(), names(0, [0.0, 0.5], ["left", "left"]))
     with pytest.raises(MalformedMessage) as refused:
         step(state, names(1, [0.5], ["left"]), NOW)
     assert refused.value.errors[0].field == "t"
@@ -147,21 +147,21 @@ def test_time_that_does_not_rise_is_refused() -> None:
 
 def test_unknown_aoi_is_refused_and_the_known_ones_are_listed() -> None:
     with pytest.raises(MalformedMessage) as refused:
-        step(began(), names(0, [0.0, 0.1], ["left", "cup"]), NOW)
+        step(configured_session(), names(0, [0.0, 0.1], ["left", "cup"]), NOW)
     (error,) = refused.value.errors
     assert (error.field, error.value) == ("aoi.1", "cup")
     assert "left, middle, right" in error.rule
 
 
 def test_point_beside_the_stimulus_is_accepted_and_an_impossible_one_is_refused() -> None:
-    _, facts = fold(began(), points(0, [0.0], [1.2]))
+    _, facts = fold(configured_session(), points(0, [0.0], [1.2]))
     assert last(facts).gaze.category == "uncertain"
     with pytest.raises(MalformedMessage):
-        step(began(), points(0, [0.0], [1e300]), NOW)
+        step(configured_session(), points(0, [0.0], [1e300]), NOW)
 
 
 def test_largest_times_and_numbers_of_a_chunk_are_accepted() -> None:
-    state, _ = fold(began(), names(0, [-1e11], ["left"]), names(2**53, [1e11], ["right"]))
+    state, _ = fold(configured_session(), names(0, [-1e11], ["left"]), names(2**53, [1e11], ["right"]))
     state, facts = fold(state, points(2**53, [i / 100 - 1e9 for i in range(30)], [0.5] * 30), session("ending"))
     assert last(facts).gaze.dropped == 2**53
     assert load(dump(state)) == state

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from shift_monitor.core import step
 from shift_schemas.messages import Gaze, GazeChunk
-from support.monitor_sessions import NOW, began, fold, last, points
+from support.monitor_sessions import NOW, configured_session, fold, last, points
 
 
 def at_rate(hz: float, n: int, x: float | None = 0.1, seq: int = 0, start_s: float = 10.0) -> GazeChunk:
@@ -13,7 +13,7 @@ def at_rate(hz: float, n: int, x: float | None = 0.1, seq: int = 0, start_s: flo
 
 
 def warnings(*chunks: GazeChunk) -> list[str]:
-    return last(fold(began(), *chunks)[1]).warnings
+    return last(fold(configured_session(), *chunks)[1]).warnings
 
 
 @pytest.mark.parametrize("hz", [5, 4, 2, 1])
@@ -51,7 +51,7 @@ def test_gaze_mostly_lost_or_off_the_stimulus_causes_a_warning() -> None:
 
 
 def test_recorded_chunk_and_reply_contain_the_warnings() -> None:
-    done = step(began(), at_rate(2, 12), NOW)
+    done = step(configured_session(), at_rate(2, 12), NOW)
     gaze = done.facts[0]
     assert isinstance(gaze, Gaze)
     assert isinstance(done.result, dict)

@@ -14,7 +14,7 @@ def context(name: str, **settings: Any) -> Context:
     return Context(Study.model_validate({"study": "s", "learner": {"name": name} | settings}))
 
 
-def lived(learner: Learner, where: Context, interactions: int) -> tuple[Any, list[tuple[int, int, float]]]:
+def after_history(learner: Learner, where: Context, interactions: int) -> tuple[Any, list[tuple[int, int, float]]]:
     """Return the memory after a random history, and the history: triple, action and reward of each interaction."""
     rng = np.random.default_rng(5)
     memory, seen = learner.initial(where), []

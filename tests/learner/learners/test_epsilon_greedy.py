@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from shift_learner.learners import LEARNERS
-from support.learner_histories import context, lived
+from support.learner_histories import after_history, context
 
 
 def test_epsilon_greedy_value_is_the_mean_with_the_prior_as_one_result() -> None:
     where, learner = context("epsilon-greedy", epsilon=0.6), LEARNERS["epsilon-greedy"]
-    memory, seen = lived(learner, where, 50)
+    memory, seen = after_history(learner, where, 50)
     for triple in range(30):
         row = learner.row(where, memory, triple)
         for action in range(6):

@@ -12,7 +12,7 @@ from shift_learner.learners.tabular import Memory, Tabular, greedy
 from shift_model.vocabulary import LearnerName
 from shift_schemas.errors import InvalidStudy
 from shift_study.study import Study
-from support.learner_histories import all_rows, context, lived
+from support.learner_histories import after_history, all_rows, context
 
 NAMES = list(LEARNERS)
 
@@ -28,7 +28,7 @@ def test_every_learner_name_has_a_learner() -> None:
 @pytest.mark.parametrize("prior", [True, False])
 def test_rows_are_distributions_and_memory_survives_json_exactly(name: str, interactions: int, prior: bool) -> None:
     where, learner = context(name, scoring_prior=prior), LEARNERS[name]
-    memory, _ = lived(learner, where, interactions)
+    memory, _ = after_history(learner, where, interactions)
     rows = all_rows(learner, where, memory)
     for row in rows:
         assert sum(row.probabilities) == pytest.approx(1.0)
@@ -43,7 +43,7 @@ def test_rows_are_distributions_and_memory_survives_json_exactly(name: str, inte
 @pytest.mark.parametrize("name", NAMES)
 def test_functions_of_a_learner_do_not_change_the_old_memory(name: str) -> None:
     where, learner = context(name), LEARNERS[name]
-    memory, _ = lived(learner, where, 10)
+    memory, _ = after_history(learner, where, 10)
     before = json.dumps(learner.dump(memory))
     taken = Taken(11, 7, where.suggestions[7], 2, 0.5)
     learner.on_reward(where, learner.on_decision(where, memory, taken), taken, 0.4, None)
@@ -119,7 +119,7 @@ def test_rows_are_distributions_for_extreme_studies(name: str, edge: dict[str, A
     settings = {"name": name} | edge.get("learner", {})
     where = Context(Study.model_validate({"study": "s"} | edge | {"learner": settings}))
     learner = LEARNERS[name]
-    memory, _ = lived(learner, where, 4)
+    memory, _ = after_history(learner, where, 4)
     for row in all_rows(learner, where, memory):
         assert sum(row.probabilities) == pytest.approx(1.0)
         assert min(row.probabilities) >= 0

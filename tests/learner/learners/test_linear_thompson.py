@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 import pytest
 from shift_learner.learners import LEARNERS, linear_thompson
-from support.learner_histories import context, lived
+from support.learner_histories import after_history, context
 
 
 def test_normal_chances_match_frequencies_of_sampling() -> None:
@@ -19,7 +19,7 @@ def test_normal_chances_match_frequencies_of_sampling() -> None:
 
 def test_linear_thompson_matches_ridge_regression() -> None:
     where, learner = context("linear-thompson", noise=0.3, prior_strength=2.0), LEARNERS["linear-thompson"]
-    memory, seen = lived(learner, where, 80)
+    memory, seen = after_history(learner, where, 80)
     prior = np.zeros(11)
     prior[-1] = 1.0
     for action in range(6):

@@ -13,7 +13,7 @@ CONTEXT = Context(Study.model_validate({"study": "s", "learner": {"name": "plann
 PLANNER = Planner()
 
 
-def lived(context: Context, interactions: int, seed: int = 1) -> Memory:
+def after_history(context: Context, interactions: int, seed: int = 1) -> Memory:
     rng = np.random.default_rng(seed)
     memory = PLANNER.initial(context)
     for n in range(1, interactions + 1):
@@ -36,13 +36,13 @@ def test_planner_without_data_follows_the_scoring_system_at_high_capacity() -> N
 
 
 def test_every_row_puts_all_probability_on_its_best_value() -> None:
-    for probabilities, values, _ in rows(CONTEXT, lived(CONTEXT, 30)):
+    for probabilities, values, _ in rows(CONTEXT, after_history(CONTEXT, 30)):
         assert sorted(probabilities) == [0, 0, 0, 0, 0, 1]
         assert probabilities.index(1.0) == values.index(max(values))
 
 
 def test_memory_survives_json_exactly() -> None:
-    memory = lived(CONTEXT, 40)
+    memory = after_history(CONTEXT, 40)
     again = PLANNER.load(CONTEXT, json.loads(json.dumps(PLANNER.dump(memory))))
     assert rows(CONTEXT, again) == rows(CONTEXT, memory)
     assert again.history == memory.history
@@ -50,13 +50,13 @@ def test_memory_survives_json_exactly() -> None:
 
 def test_changed_study_folds_the_history_again() -> None:
     other = Context(Study.model_validate({"study": "s", "capacity": {"recovery": 0.1}, "learner": {"name": "planner"}}))
-    memory = lived(CONTEXT, 20)
+    memory = after_history(CONTEXT, 20)
     assert rows(other, memory) == rows(other, PLANNER.load(other, PLANNER.dump(memory)))
     assert rows(other, memory) != rows(CONTEXT, memory)
 
 
 def test_visits_count_reported_decisions() -> None:
-    memory = lived(CONTEXT, 25)
+    memory = after_history(CONTEXT, 25)
     counted = np.zeros((30, 6), int)
     for event in memory.history:
         if len(event) == 3:
@@ -82,7 +82,7 @@ def test_planner_works_with_an_additional_strategy() -> None:
         )
     )
     assert context.actions == 12
-    assert all(sum(row[0]) == 1 and len(row[1]) == 12 for row in rows(context, lived(context, 5)))
+    assert all(sum(row[0]) == 1 and len(row[1]) == 12 for row in rows(context, after_history(context, 5)))
 
 
 def test_repeated_failures_turn_the_planner_away_from_a_suggestion() -> None:

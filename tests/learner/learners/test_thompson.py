@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from shift_learner.learners import LEARNERS, thompson
-from support.learner_histories import context, lived
+from support.learner_histories import after_history, context
 
 
 def test_chances_of_two_beta_arms_match_the_closed_form() -> None:
@@ -33,7 +33,7 @@ def test_finer_grid_changes_beta_chances_by_less_than_the_stated_error(monkeypat
 @pytest.mark.parametrize("states", ["cognitive", "triples"])
 def test_beta_posteriors_count_per_state_or_per_triple(states: str) -> None:
     where, learner = context("thompson", thompson_states=states, prior_strength=2.0), LEARNERS["thompson"]
-    memory, seen = lived(learner, where, 80)
+    memory, seen = after_history(learner, where, 80)
     for triple in range(30):
         row = learner.row(where, memory, triple)
         for action in range(6):

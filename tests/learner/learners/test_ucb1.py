@@ -7,12 +7,12 @@ from math import log, sqrt
 import numpy as np
 import pytest
 from shift_learner.learners import LEARNERS
-from support.learner_histories import context, lived
+from support.learner_histories import after_history, context
 
 
 def test_ucb1_value_is_the_bound_of_auer_on_rewards_between_0_and_1() -> None:
     where, learner = context("ucb1", exploration=0.7), LEARNERS["ucb1"]
-    memory, seen = lived(learner, where, 300)
+    memory, seen = after_history(learner, where, 300)
     for triple in range(30):
         row = learner.row(where, memory, triple)
         here = [(a, r) for t, a, r in seen if t == triple]
