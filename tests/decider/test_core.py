@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_decider import core
-from shift_decider.core import ANY_TASK, DeciderState, Lacks, decided, lacks
+from shift_decider.core import ANY_TASK, DeciderState, MissingInputs, decide, missing_inputs
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import TRIPLES, Triple
 from shift_schemas.core_protocol import InputsMissing, Step
@@ -202,9 +202,9 @@ def test_it_waits_as_long_as_the_study_says() -> None:
 
 def test_the_second_decision_waits_until_the_first_was_applied_everywhere() -> None:
     after = ask(folded(*READY)).state
-    assert lacks(after, Seen()) == Lacks(config=False, observation=True, policy=True)
+    assert missing_inputs(after, Seen()) == MissingInputs(config=False, observation=True, policy=True)
     current = folded_on(after, observation(2, decision=1), policy(2))
-    assert lacks(current, Seen()) == Lacks(config=False, observation=False, policy=False)
+    assert missing_inputs(current, Seen()) == MissingInputs(config=False, observation=False, policy=False)
     assert made(current, name="d2").n == 2
 
 
@@ -396,7 +396,7 @@ def test_a_restart_at_any_point_changes_nothing(messages: list[Any], at: int) ->
 def test_the_preview_s_function_is_the_decision_s_and_changes_nothing() -> None:
     state = folded(*READY)
     before = core.dump(state)
-    previewed = decided(state, "grasp", "d1", Seen(), NOW, timed_out=False)
+    previewed = decide(state, "grasp", "d1", Seen(), NOW, timed_out=False)
     assert core.dump(state) == before
     facts: tuple[Fact, ...] = ask(state).facts
     assert facts == (previewed,)

@@ -29,6 +29,7 @@ from shift_recording.provenance import attachments_of, metadata_of
 from shift_recording.segments import SegmentWriter
 from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.messages import (
+    FORMAT,
     Command,
     Configure,
     Decide,
@@ -53,9 +54,9 @@ SCHEMAS = subject_schemas()
 
 
 class Session:
-    """One session of study ``study``; its random order is ``seed``'s."""
+    """One session of study ``study`` in ``recording_format``; ``seed`` gives its random order."""
 
-    def __init__(self, study: dict[str, Any] | None = None, seed: int = 1) -> None:
+    def __init__(self, study: dict[str, Any] | None = None, seed: int = 1, recording_format: int = FORMAT) -> None:
         self.rng = random.Random(seed)
         self.now_ns = START
         self.states: dict[str, Any] = dict.fromkeys(CORES)
@@ -66,8 +67,11 @@ class Session:
         self.answered = Seen(config=1)
         self.gaze_s = 0.0
         self.chunks = 0
-        self.do("recorder", StartSession(command_id="start", session="s1", participant="P01", seed=7,
-                                         study={"study": "test", "tasks": ["a", "b"], **(study or {})}))  # fmt: skip
+        given = {"study": "test", "tasks": ["a", "b"], **(study or {})}
+        start = StartSession(
+            command_id="start", session="s1", participant="P01", seed=7, study=given, format=recording_format
+        )
+        self.do("recorder", start)
 
     def do(self, owner: str, message: Fact | Command | GazeChunk, timed_out: bool = False) -> tuple[Fact, ...]:
         """Step a core and put out what it gives."""

@@ -14,7 +14,8 @@ from shift_runtime.bus.protocol import Bus, Handle, Incoming, Reply, Request
 from shift_runtime.clock import ManualClock
 from shift_runtime.journal import Batch, Journal
 from shift_runtime.metrics import Metrics
-from shift_runtime.service.loop import Core, Worker
+from shift_runtime.service.core import Core
+from shift_runtime.service.loop import Worker
 from shift_schemas.codec import decode, encode
 from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import Problem, Unavailable, UnknownThing
@@ -201,8 +202,7 @@ class Rig:
         """End it without another word, wherever it is; what was not committed is gone."""
         self.running.cancel()
         await asyncio.gather(self.running, return_exceptions=True)
-        for task in self.worker._tasks:
-            task.cancel()
+        self.worker.tasks.cancel()
         await self.own_bus.close()
         self.journal.close()
 
@@ -259,5 +259,5 @@ class Rig:
 
     def config(self) -> int:
         """The version of the configuration that the worker has read, committed or not."""
-        state = self.worker.states.get("s1")
+        state = self.worker.states.loaded("s1")
         return state.config if state else 0

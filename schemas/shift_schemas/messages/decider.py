@@ -6,7 +6,7 @@ from pydantic import Field
 from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass, PolicySource
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Strategy, Text
+from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Seen, Strategy, Text
 
 
 class TripleView(Message):
@@ -64,6 +64,9 @@ class Decision(Fact):
     stale: bool = Field(description="The observation had not seen all that it must have.")
     state: str = Field(description="The row of the policy that was drawn from.")
     seed: Count = Field(description="The session's seed; the draw's generator is seeded by (seed, n).")
+    required: Seen | None = Field(
+        default=None, description="How far the decider had to have read its inputs; left out before format 3."
+    )
     override_id: str = Field(default="", description="The override that it follows; '' is none.")
     reason: str = Field(default="", description="The override's reason.")
 

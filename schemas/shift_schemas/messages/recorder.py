@@ -20,8 +20,12 @@ from shift_schemas.messages.base import (
 )
 from shift_schemas.timestamps import Stamp
 
-FORMAT = 2
-"""What a session records. 1: no shares of gaze, no warnings, no restarts. A session keeps its first format."""
+FORMAT = 3
+"""The format that a new session records in. A session keeps the format that it began with.
+
+1: no shares of gaze, no warnings, no restarts. 2: an estimate is published only where it changes, and a decision does
+not record what it required. 3: a configuration always publishes its estimates, and a decision records ``required``.
+"""
 
 
 class Session(Fact):
@@ -43,7 +47,7 @@ class Session(Fact):
     replay_of: str = Field(default="", description="Name of the recording that this session replays.")
     software: str = Field(default="", description="Version of shift-mesh.")
     revision: str = Field(default="", description="Git revision of shift-mesh, where known.")
-    format: Count = Field(default=1, description="Which facts and fields the session records; today 2.")
+    format: Count = Field(default=1, description="Which facts and fields the session records; today 3.")
     warnings: Warnings = Field(default=[], description="What was accepted at its start and may not be meant.")
 
 

@@ -9,7 +9,7 @@ import asyncio
 import json
 from typing import Any
 
-from shift_decider.core import ANY_TASK, decided
+from shift_decider.core import ANY_TASK, decide
 from shift_runtime.clock import Clock
 from shift_runtime.mesh_api import READ_WAIT_S, MeshApi
 from shift_runtime.mesh_client import MeshClient
@@ -98,7 +98,7 @@ class GatewayApi(MeshApi):
 
         def attempt(timed_out: bool) -> dict[str, Any] | None:
             try:
-                found = decided(decider_state(view), task, PREVIEW_ID, view.required, self.clock.now(), timed_out)
+                found = decide(decider_state(view), task, PREVIEW_ID, view.required, self.clock.now(), timed_out)
             except InputsMissing:
                 return None
             return found.model_dump(mode="json", exclude={"decision_id"})

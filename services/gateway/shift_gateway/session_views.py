@@ -13,4 +13,5 @@ def decider_state(view: SessionView) -> DeciderState:
     return DeciderState(
         session=view.fact.session, seed=view.fact.seed, phase=view.fact.state, config=view.config,
         observation=view.observation, policy=view.policy, n=view.n, overrides=dict(view.overrides),
+        format=view.fact.format,
     )  # fmt: skip

@@ -25,7 +25,7 @@ from shift_schemas.lifecycle import has_ended, is_ending
 from shift_schemas.messages import Config, Fact, Observation, Session
 from shift_schemas.registry import OWNER_OF, OWNERS, SUBJECTS
 
-from shift_verify.decider import Redecide
+from shift_verify.decider import decider_verification
 from shift_verify.difference import Difference, Differs, NotRecorded, Placed, differ, name_of
 from shift_verify.monitor_learner import Inputs, LearnerRefold, MonitorRefold
 from shift_verify.recorder import LAST, Rerecord, check_front
@@ -216,7 +216,7 @@ class _Verification:
         monitor = self._guarded("monitor", MonitorRefold(inputs))
         decider = None
         if self._begins("decider"):
-            fold = Redecide(inputs, self._unbroken("decider"), self._following("decider"))
+            fold = decider_verification(inputs, self._unbroken("decider"), self._following("decider"))
             decider = self._guarded("decider", fold)
         unbroken = self.owners["monitor"].unbroken
         for i, placed in enumerate(self._monitored()):

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shift_runtime import reader as reader_module
-from shift_runtime.service import loop as worker_module
+from shift_runtime.service import disk_alarm as disk_alarm_module
+from shift_runtime.service import transaction as transaction_module
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import Conflict, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import Decide, Decision, Gaze, Marker, OutboxPage, OutboxQuery, Seen
@@ -266,7 +267,7 @@ async def test_a_session_that_ended_is_closed_and_read_no_more(live: Rig) -> Non
     live.monitor.put_out(fixation(1))
     await asyncio.sleep(0.05)
     assert live.outbox() == [(1, "decision d1")]
-    assert live.worker.states.get("s1") is None
+    assert live.worker.states.loaded("s1") is None
     assert (await live.decide("d1")).repeat
     await live.crash()
     live.start()
@@ -280,7 +281,7 @@ async def test_a_session_that_ended_is_closed_and_read_no_more(live: Rig) -> Non
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """What can wait for a commit waits for good."""
-    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+    monkeypatch.setattr(transaction_module, "COMMIT_WITHIN_S", 60.0)
 
 
 async def read_configuration(rig: Rig, version: int) -> None:
@@ -309,7 +310,7 @@ async def test_what_puts_nothing_out_is_committed_soon_and_only_once(
     live: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await live.decide("d1")
-    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 0.02)
+    monkeypatch.setattr(transaction_module, "COMMIT_WITHIN_S", 0.02)
     before = live.journal.commits
     await read_configuration(live, 2)
     await until(lambda: live.committed().config == 2)
@@ -397,7 +398,7 @@ async def test_facts_of_a_refused_commit_are_read_again_once_there_is_room(
 async def test_health_says_that_the_disk_refuses_and_recovers_without_being_asked_for_anything(
     live: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(worker_module, "CHECK_EVERY_S", 0.02)
+    monkeypatch.setattr(disk_alarm_module, "CHECK_EVERY_S", 0.02)
     live.journal.full = True
     with pytest.raises(Unavailable):
         await live.decide("d1")
@@ -569,6 +570,6 @@ def test_facts_and_commands_are_applied_once_whatever_happens(
         await rig.crash()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(worker_module, "CHECK_EVERY_S", 0.01)
+        patch.setattr(disk_alarm_module, "CHECK_EVERY_S", 0.01)
         patch.setattr(reader_module, "PULL_EVERY_S", 0.01)
         asyncio.run(test())
