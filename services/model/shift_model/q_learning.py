@@ -1,14 +1,15 @@
 """Q-learning and the decay of epsilon (paper, section III-D; Watkins & Dayan 1992; Tokic 2010).
 
-Pure. Scalars and numpy arrays give the same bits. The scalar path calls no numpy function.
+Pure. Scalars and numpy arrays give the same bits. The functions do not need numpy.
 """
 
 from __future__ import annotations
 
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @overload
