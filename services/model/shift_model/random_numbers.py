@@ -7,10 +7,13 @@ bits; the upper 53 of them are the number. Scalars and numpy arrays give the sam
 
 from __future__ import annotations
 
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-from numpy.typing import NDArray
+from shift_model.arrays import is_array
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 _MASK = (1 << 64) - 1
 _GAMMA = 0x9E3779B97F4A7C15
@@ -36,7 +39,9 @@ def uniform(seed: Any, n: Any, stream: int = DECISION) -> Any:
     stream
         The index of one of several independent numbers at the same (seed, n).
     """
-    if isinstance(seed, np.ndarray) or isinstance(n, np.ndarray):
+    if is_array(seed) or is_array(n):
+        import numpy as np
+
         h = _mix_array(np.asarray(seed, dtype=np.uint64))
         h = _mix_array(h ^ np.asarray(n, dtype=np.uint64))
         h = _mix_array(h ^ np.uint64(stream))
@@ -68,6 +73,8 @@ def _mix(z: int) -> int:
 
 
 def _mix_array(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    import numpy as np
+
     with np.errstate(over="ignore"):
         z = z + np.uint64(_GAMMA)
         z = (z ^ (z >> np.uint64(30))) * np.uint64(_A)
