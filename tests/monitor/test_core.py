@@ -7,7 +7,6 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shift_cli.gaze_files import Sample, chunks
 from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
 from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
@@ -24,6 +23,7 @@ from shift_schemas.messages import (
     Session,
 )
 from shift_schemas.timestamps import Stamp
+from shift_sources.files.samples import Sample, chunks
 from support.monitor_sessions import (
     NEGATION,
     NOW,

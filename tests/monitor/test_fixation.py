@@ -8,8 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from shift_cli.gaze_files import Sample
 from shift_schemas.timestamps import NS
+from shift_sources.files.samples import Sample
 from shift_study.study import FixationSettings
 from support.monitor_sessions import (
     RECORDINGS,

@@ -9,9 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_ros2.gaze_batching import Lane, joined
 from shift_ros2.mapping import (
-    GazeArrival,
     gaze_of,
     performance_of,
     task_of,
@@ -22,6 +20,7 @@ from shift_ros2.mapping import (
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Problem, ShiftError
 from shift_schemas.messages import CapacityView, GazeChunk, GazeView, Observation
 from shift_schemas.timestamps import Stamp
+from shift_sources.gaze_batching import GazeArrival
 
 NOW_S = 1000.0
 RESULT = {"success": True, "duration_s": 5.0}
@@ -129,44 +128,3 @@ def test_an_observation_on_its_topic_is_that_of_rest() -> None:
         gaze=GazeView(category="focused", weights={"a": 1.0}, focus_shift=0.0, aoi="", fixations=0, dropped=0),
     )  # fmt: skip
     assert json.loads(text_of_fact(fact, fact.model_dump_json()))["gaze"]["aoi"] is None
-
-
-# --- gathering ---
-
-
-def sample(t: float, source: str = "ros", seq: int | None = None) -> GazeArrival:
-    return GazeArrival(None, GazeChunk(source=source, seq=seq or 0, t=[t], aoi=["a"]), seq is not None)
-
-
-def test_samples_are_joined_up_to_the_limit_in_their_order() -> None:
-    lane = Lane()
-    for i in range(25):
-        lane.add(sample(float(i)))
-    assert lane.ripe(10)
-    sizes, times = [], []
-    while lane:
-        taken = lane.take(10)
-        chunk = joined(taken, len(sizes))
-        sizes.append(len(chunk.t))
-        times += chunk.t
-    assert sizes == [10, 10, 5]
-    assert times == [float(i) for i in range(25)]
-    assert lane.samples == 0
-
-
-def test_what_differs_is_not_joined() -> None:
-    lane = Lane()
-    point = GazeArrival(None, GazeChunk(source="ros", seq=0, t=[2.0], x=[0.5], y=[0.5]), False)
-    for arrival in (sample(1.0), point, sample(3.0), sample(1.0, "other"), sample(2.0, "other", seq=5)):
-        lane.add(arrival)
-    assert [len(lane.take(10)) for _ in range(5)] == [1, 1, 1, 1, 1]
-
-
-def test_a_time_that_does_not_rise_costs_that_sample_only() -> None:
-    lane = Lane()
-    lane.add(sample(1.0))
-    with pytest.raises(MalformedMessage, match="t must rise"):
-        lane.add(sample(1.0))
-    lane.add(sample(1.5))
-    lane.add(sample(0.5, "another clock"[:7]))
-    assert lane.samples == 3

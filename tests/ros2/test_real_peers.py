@@ -13,8 +13,8 @@ from typing import Any
 
 import httpx
 import pytest
-from shift_cli.gaze_files import samples
 from shift_recording.mcap.reader import Recording
+from shift_sources.files.formats import read_samples
 from support.ros_environments import ROOT, python_of
 from support.ros_rig import Bridge, Peer, peer
 from support.whole_mesh import LiveMesh, running_mesh
@@ -37,7 +37,7 @@ def gaze_lines(folder: Path, trials: list[Path]) -> tuple[Path, int]:
     """Every sample of the recordings as a message of its own, one clock for all."""
     lines, offset = [], 0.0
     for trial in trials:
-        found = list(samples(trial))
+        found = list(read_samples(trial))
         for s in found:
             lines.append(json.dumps({"source": "tx300", "t": offset + s.t, "x": s.x, "y": s.y, "valid": s.valid}))
         offset += found[-1].t + 1 / RATE_HZ

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from shift_cli.gaze_files import Sample, chunks, samples
 from shift_monitor.core import MonitorState, step
 from shift_monitor.gaze_input import gaze_input
 from shift_schemas.messages import (
@@ -25,6 +24,8 @@ from shift_schemas.messages import (
     Versions,
 )
 from shift_schemas.timestamps import Stamp
+from shift_sources.files.formats import read_samples
+from shift_sources.files.samples import Sample, chunks
 from shift_study.loading import study_json, study_of
 from shift_study.study import Study
 
@@ -117,7 +118,7 @@ def fixations(facts: list[Fact]) -> list[Fixation]:
 
 
 def recording(path: Path) -> list[Sample]:
-    return list(samples(path))
+    return list(read_samples(path))
 
 
 def played(taken: list[Sample], n: int, of: Study | None = None) -> tuple[MonitorState, list[Fact]]:

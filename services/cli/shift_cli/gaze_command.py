@@ -13,8 +13,7 @@ import typer
 
 if TYPE_CHECKING:
     from shift_runtime.rest_client import RestClient
-
-    from shift_cli.gaze_files import Sample
+    from shift_sources.files.samples import Sample
 
 app = typer.Typer(no_args_is_help=True, help="Gaze recordings.")
 PIECE_S = 0.05
@@ -49,12 +48,11 @@ def play(
     """
     from shift_runtime.rest_client import RestClient
     from shift_schemas.errors import MalformedMessage, check_id
-
-    from shift_cli.gaze_files import samples
+    from shift_sources.files.formats import read_samples
 
     if source is not None:
         check_id("--source", source)
-    found = list(samples(file))
+    found = list(read_samples(file))
     if not found:
         raise MalformedMessage(f"{file.name} holds no samples")
     with RestClient(url) as shift:
@@ -100,8 +98,7 @@ def _stream(
     """Send the samples, each when its time has come; the warnings of the last answer and of restarts."""
     from rich.console import Console
     from rich.progress import Progress
-
-    from shift_cli.gaze_files import chunks
+    from shift_sources.files.samples import chunks
 
     length_s = found[-1].t - found[0].t
     per_chunk = max(1, round(len(found) / max(length_s, 1e-9) * PIECE_S * speed))

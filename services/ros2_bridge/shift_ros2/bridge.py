@@ -1,7 +1,7 @@
-"""The bridge: what ROS messages do in the mesh, and what of the mesh becomes ROS messages.
+"""The bridge: it turns ROS messages into commands of the mesh, and facts of the mesh into ROS messages.
 
-It knows no transport: a backend tells it what arrived, a door does it, as the gateway's does. A request is
-answered when everything that arrived before it is in the mesh, or had its time.
+It knows no transport: a backend calls it with what arrived, and it calls the same mesh API as the gateway. A request
+is answered when everything that arrived before it is in the mesh, or after a time limit.
 """
 
 from __future__ import annotations
@@ -18,80 +18,80 @@ from shift_runtime.metrics import Metrics
 from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import Decision, Fact
 from shift_schemas.requests import MarkerBody, StartBody
+from shift_sources.gaze_batching import GazeArrival
+from shift_sources.gaze_forwarder import Batching, GazeForwarder
 
 from shift_ros2 import mapping
 from shift_ros2.backend import Answer, Backend
-from shift_ros2.command_queue import Reports
+from shift_ros2.command_queue import CommandQueue
 from shift_ros2.diagnostics import Diagnostics
-from shift_ros2.gaze_forwarder import GazeSender
 from shift_ros2.interfaces import PUBLISHED
-from shift_ros2.mapping import GazeArrival
 from shift_ros2.ros4hri import Persons
 from shift_ros2.settings import BridgeSettings
 
 log = structlog.get_logger()
 GAZE_WAIT_S = 0.2
-"""How long a request waits for gaze that came before it; DESIGN.md, "Read your own writes"."""
+"""How long a request waits for gaze that came before it (docs/design.md)."""
 SESSIONS = 64
-"""Sessions with gaze at a time; a further one takes the place of one that is quiet."""
+"""Sessions with gaze at a time; a further one replaces one that is idle."""
 BIND_EVERY_S = 1.0
 
 
 class Bridge:
-    """See the module. :meth:`run` goes on until it is cancelled."""
+    """One bridge between a ROS node and the mesh. :meth:`run` continues until it is cancelled."""
 
     backend: Backend
 
-    def __init__(self, settings: BridgeSettings, door: MeshApi, metrics: Metrics, clock: Clock) -> None:
+    def __init__(self, settings: BridgeSettings, mesh: MeshApi, metrics: Metrics, clock: Clock) -> None:
         self.settings = settings
-        self.door = door
+        self.mesh = mesh
         self.metrics = metrics
         self.clock = clock
         self.session = settings.bound_session
         self.diagnostics = Diagnostics(settings.diagnostics_s)
-        self._about = (self.session, settings.task)
-        self._senders: OrderedDict[str, GazeSender] = OrderedDict()
-        self._reports = Reports(self.on_lost)
+        self._next_task = (self.session, settings.task)
+        self._forwarders: OrderedDict[str, GazeForwarder] = OrderedDict()
+        self._commands = CommandQueue(self.on_lost)
         self._persons = Persons()
         self._attached: set[str] = set()
-        self._ahead: set[str] = set()
-        """Decisions that were put out with their answer, before the fact came back."""
+        self._published_early: set[str] = set()
+        """Decisions that were published with their answer, before the fact came back."""
         self._bound = False
 
     async def run(self) -> None:
-        """Bind to the session, hand reports on and tell what happens, until cancelled."""
+        """Bind to the session, send commands and publish diagnostics, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._reports.run())
+            tasks.create_task(self._commands.run())
             tasks.create_task(self._bind())
-            tasks.create_task(self._tell())
+            tasks.create_task(self._publish_diagnostics())
 
     async def drain(self, wait_s: float) -> None:
-        """Let what arrived go through."""
+        """Send what has arrived, for ``wait_s`` seconds at most, and close the forwarders."""
         until = asyncio.get_running_loop().time() + wait_s
-        for sender in list(self._senders.values()):
-            await sender.passed(max(0.0, until - asyncio.get_running_loop().time()))
-        await self._reports.passed(max(0.0, until - asyncio.get_running_loop().time()))
-        for sender in self._senders.values():
-            sender.close()
+        for forwarder in list(self._forwarders.values()):
+            await forwarder.flush(max(0.0, until - asyncio.get_running_loop().time()))
+        await self._commands.flush(max(0.0, until - asyncio.get_running_loop().time()))
+        for forwarder in self._forwarders.values():
+            forwarder.close()
 
-    # --- what a backend tells ---
+    # --- called by a backend ---
 
     def on_text(self, topic: str, text: str) -> None:
-        """A message came. Raises :class:`ShiftError`."""
+        """Handle a message. Raise :class:`ShiftError`."""
         self.diagnostics.came(topic)
         match topic:
             case "gaze":
-                self._take_gaze(mapping.gaze_of(text, self.settings.source, self.clock.now().ns / 1e9))
+                self._forward_gaze(mapping.gaze_of(text, self.settings.source, self.clock.now().ns / 1e9))
             case "task":
-                about = mapping.task_of(text)
-                self._about = (about.session or self.session, about.task)
+                message = mapping.task_of(text)
+                self._next_task = (message.session or self.session, message.task)
             case "task_performance":
                 report = mapping.performance_of(text)
                 session = report.session or self.session
-                self._reports.put(topic, partial(self._report, session, report))
+                self._commands.put(topic, partial(self._report, session, report))
 
     async def on_request(self, request_id: str | None) -> Answer:
-        """The next strategy: what the service answers."""
+        """Return the answer of the service: the next strategy, or why there is none."""
         self.diagnostics.came("next_strategy")
         try:
             answer = await self._decide(request_id)
@@ -106,69 +106,71 @@ class Bridge:
         return True, answer
 
     def on_tracked(self, persons: list[str]) -> None:
-        """ROS4HRI: who is tracked."""
+        """Mark a change of the tracked persons (ROS4HRI)."""
         self._mark(self._persons.tracked(persons))
 
     def on_engagement(self, person: str, level: int) -> None:
-        """ROS4HRI: how engaged somebody is."""
+        """Mark a change of a person's engagement (ROS4HRI)."""
         self._mark(self._persons.engagement(person, level))
 
     def on_lost(self, topic: str, error: ShiftError, count: int = 1, reason: str = "") -> None:
-        """Count, and tell when it is time."""
+        """Count lost messages; the next diagnostics report them."""
         self.diagnostics.lost(topic, error, count, reason)
         self.metrics.dropped(reason or ("malformed" if isinstance(error, MalformedMessage) else "refused"), count)
 
     def _gaze_lost(self, topic: str, error: ShiftError, count: int) -> None:
         self.on_lost(topic, error, count)
 
-    # --- in ---
+    # --- from ROS into the mesh ---
 
-    def _take_gaze(self, arrival: GazeArrival) -> None:
+    def _forward_gaze(self, arrival: GazeArrival) -> None:
         session = arrival.session or self.session
-        sender = self._senders.get(session) or self._new_sender(session)
-        self._senders.move_to_end(session)
-        sender.put(arrival)
+        forwarder = self._forwarders.get(session) or self._new_forwarder(session)
+        self._forwarders.move_to_end(session)
+        forwarder.put(arrival)
 
-    def _new_sender(self, session: str) -> GazeSender:
-        if len(self._senders) >= SESSIONS:
-            quiet = next((of for of, sender in self._senders.items() if sender.quiet), None)
-            if quiet is None:
+    def _new_forwarder(self, session: str) -> GazeForwarder:
+        if len(self._forwarders) >= SESSIONS:
+            idle = next((of for of, forwarder in self._forwarders.items() if forwarder.idle), None)
+            if idle is None:
                 raise Unavailable(f"gaze of {SESSIONS} sessions waits already; there is no room for another")
-            self._senders.pop(quiet).close()
-        sender = self._senders[session] = GazeSender(self.door, self.settings, session, self._attach, self._gaze_lost)
-        return sender
+            self._forwarders.pop(idle).close()
+        batching = Batching(self.settings.gaze_chunk, self.settings.gaze_wait_s)
+        forwarder = GazeForwarder(self.mesh, session, batching, self._attach, self._gaze_lost)
+        self._forwarders[session] = forwarder
+        return forwarder
 
     async def _report(self, session: str, report: mapping.PerformanceMessage) -> None:
         await self._attach(session)
-        await self.door.report(session, report.body)
+        await self.mesh.report(session, report.body)
 
     async def _decide(self, request_id: str | None) -> str:
-        session, task = self._about
+        session, task = self._next_task
         if task is None:
             rule = 'publish {"task": "..."} on shift/task before the request, or set parameter task'
             raise MalformedMessage(f"task: {rule}", (FieldError(field="task", value="", rule=rule),))
         await self._attach(session)
-        if (sender := self._senders.get(session)) is not None and not sender.quiet:
-            await sender.passed(GAZE_WAIT_S)
-        await self._reports.passed(READ_WAIT_S)
-        answer, repeat = await self.door.decide(session, task, request_id)
+        if (forwarder := self._forwarders.get(session)) is not None and not forwarder.idle:
+            await forwarder.flush(GAZE_WAIT_S)
+        await self._commands.flush(READ_WAIT_S)
+        answer, repeat = await self.mesh.decide(session, task, request_id)
         text = mapping.text_of_answer(answer)
         if not repeat:
-            self._put_out_first(session, answer["decision_id"], text)
+            self._publish_before_reply(session, answer["decision_id"], text)
         return text
 
-    def _put_out_first(self, session: str, decision_id: str, text: str) -> None:
-        """A decision is heard before it is acknowledged; should we die in between, nobody was told that it is made."""
-        if decision_id not in self.door.read_model.views[session].decisions:
-            self._ahead.add(decision_id)
+    def _publish_before_reply(self, session: str, decision_id: str, text: str) -> None:
+        """Publish before replying, so that a crash cannot leave an acknowledged decision unpublished."""
+        if decision_id not in self.mesh.read_model.views[session].decisions:
+            self._published_early.add(decision_id)
             self.backend.publish("decision", text)
 
     def _mark(self, text: str | None) -> None:
         if text is not None:
-            body = MarkerBody(text=text, marker_id=new_id("m-"))  # one id, however often it is sent
-            self._reports.put("ros4hri", partial(self.door.mark, self.session, body))
+            body = MarkerBody(text=text, marker_id=new_id("m-"))  # a repeat must carry the same id
+            self._commands.put("ros4hri", partial(self.mesh.mark, self.session, body))
 
-    # --- out ---
+    # --- from the mesh to ROS ---
 
     async def _bind(self) -> None:
         while not self._bound:
@@ -176,15 +178,15 @@ class Bridge:
                 await self._attach(self.session)
                 self._bound = self.session in self._attached
                 if not self._bound:
-                    self.diagnostics.now(f"waits: for the {', the '.join(self.door.read_model.missing)}")
+                    self.diagnostics.now(f"waits: for the {', the '.join(self.mesh.read_model.missing)}")
             except UnknownThing:
-                await self._begin()
+                await self._start_session()
             except ShiftError as e:
                 self.diagnostics.now(f"waits: {e.detail}")
             if not self._bound:
                 await asyncio.sleep(BIND_EVERY_S if not self.settings.create_session else 0.2)
 
-    async def _begin(self) -> None:
+    async def _start_session(self) -> None:
         settings = self.settings
         if not settings.create_session:
             self.diagnostics.now(f"waits: there is no session {self.session}; begin it, or set create_session:=true")
@@ -194,35 +196,35 @@ class Bridge:
             seed=settings.seed, condition=settings.condition,
         )  # fmt: skip
         try:
-            await self.door.start(body)
+            await self.mesh.start(body)
             log.info("session begun", session=self.session, study=settings.study)
         except ShiftError as e:
             self.diagnostics.now(f"waits: session {self.session} cannot begin: {e.detail}")
 
     async def _attach(self, session: str) -> None:
-        """Put out what becomes known of a session from now on. Raises :class:`UnknownThing` where there is none."""
+        """Publish the facts of a session from now on. Raise :class:`UnknownThing` if it does not exist."""
         if session in self._attached:
             return
-        view = await self.door.read_model.view(session)
-        if session not in self._attached and not self.door.read_model.missing:  # what is old is not told again
+        view = await self.mesh.read_model.view(session)
+        if session not in self._attached and not self.mesh.read_model.missing:  # old facts are not published again
             self._attached.add(session)
-            view.listeners.append(self._put_out)
+            view.listeners.append(self._publish)
 
-    def _put_out(self, fact: Fact, payload: str) -> None:
+    def _publish(self, fact: Fact, payload: str) -> None:
         if fact.subject not in PUBLISHED:
             return
-        if isinstance(fact, Decision) and fact.decision_id in self._ahead:
-            self._ahead.discard(fact.decision_id)
+        if isinstance(fact, Decision) and fact.decision_id in self._published_early:
+            self._published_early.discard(fact.decision_id)
             return
         self.backend.publish(fact.subject, mapping.text_of_fact(fact, payload))
 
-    async def _tell(self) -> None:
+    async def _publish_diagnostics(self) -> None:
         while True:
-            self.tell()
+            self.publish_diagnostics()
             await asyncio.sleep(min(0.25, self.settings.diagnostics_s))
 
-    def tell(self) -> None:
-        """Publish the diagnostics, if there is news and it is time."""
+    def publish_diagnostics(self) -> None:
+        """Publish the diagnostics if something changed and enough time has passed."""
         waits = self.backend.state
         if self._bound:
             self.diagnostics.now(f"waits: {waits}" if waits else "ready")

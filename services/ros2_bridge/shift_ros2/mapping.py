@@ -1,13 +1,13 @@
-"""The JSON inside ROS messages <-> messages of the mesh, strictly. Pure.
+"""Map the JSON in ROS messages to messages of the mesh and back, strictly. Pure.
 
-The fields are those of INTERFACE.md. Each message may carry ``session``; single gaze samples have plain
-values where a chunk has lists. Errors are :class:`MalformedMessage` with field, value and rule.
+The fields are those of docs/interface.md. Each message may carry ``session``. A single gaze sample has plain values
+where a chunk has lists. Errors are :class:`MalformedMessage` with field, value and rule.
 """
 
 from __future__ import annotations
 
 import json
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from pydantic_core import to_json
@@ -25,52 +25,44 @@ from shift_schemas.ids import Id
 from shift_schemas.messages import Fact, GazeChunk, Message, Observation
 from shift_schemas.requests import PerformanceBody
 from shift_schemas.strict_json import parse_json
+from shift_sources.gaze_batching import COLUMNS, GazeArrival
 
 TEXT_LIMIT = 256 * 1024
-"""As the gateway's: bytes of one message."""
-COLUMNS = ("t", "x", "y", "valid", "aoi")
+"""Bytes of one message; the gateway has the same limit."""
 UNNUMBERED = 0
 M = TypeVar("M", bound=BaseModel)
 _ID: TypeAdapter[str] = TypeAdapter(Id)
 
 
-class GazeArrival(NamedTuple):
-    """Gaze as it came. Where it had no ``seq``, the chunk's is 0 and the bridge numbers it."""
-
-    session: str | None
-    chunk: GazeChunk
-    numbered: bool
-
-
 class TaskMessage(Message):
-    """What the next request is about."""
+    """The task of the next request."""
 
     session: Id | None = None
     task: Id = Field(description="The task that is to be explained.")
 
 
 class PerformanceMessage(PerformanceBody):
-    """How the task went."""
+    """The report of a task's performance."""
 
     session: Id | None = None
 
     @property
     def body(self) -> PerformanceBody:
-        """Without the session."""
+        """Return the report without its session."""
         return PerformanceBody(
             decision_id=self.decision_id, comprehension=self.comprehension, enabledness=self.enabledness
         )
 
 
 def gaze_of(text: str, source: str, now_s: float) -> GazeArrival:
-    """A chunk, or a single sample as a chunk of one.
+    """Return a chunk, or a single sample as a chunk of one.
 
     Parameters
     ----------
     source
-        Its source where it names none.
+        The source if the message names none.
     now_s
-        Its time where it is a single sample without ``t``: seconds of the bridge's clock.
+        The time of a single sample without ``t``, in seconds of the bridge's clock.
     """
     data = _object("gaze", text)
     session = data.pop("session", None)
@@ -90,17 +82,17 @@ def gaze_of(text: str, source: str, now_s: float) -> GazeArrival:
 
 
 def task_of(text: str) -> TaskMessage:
-    """What ``/shift/task`` says."""
+    """Return the message of ``/shift/task``."""
     return _validated("task", TaskMessage, text)
 
 
 def performance_of(text: str) -> PerformanceMessage:
-    """What ``/shift/task_performance`` says."""
+    """Return the message of ``/shift/task_performance``."""
     return _validated("task_performance", PerformanceMessage, text)
 
 
 def text_of_fact(fact: Fact, payload: str) -> str:
-    """A fact as its topic carries it: the message; an observation as REST answers it (no AOI is null)."""
+    """Return a fact as its topic carries it: an observation as REST answers it (no AOI is null)."""
     if not isinstance(fact, Observation):
         return payload
     data = fact.model_dump(mode="json")
@@ -109,12 +101,12 @@ def text_of_fact(fact: Fact, payload: str) -> str:
 
 
 def text_of_answer(answer: dict[str, Any]) -> str:
-    """A command's result as the service's ``message``."""
+    """Return a command's result as the service's ``message``."""
     return to_json(answer).decode()
 
 
 def text_of_error(error: ShiftError) -> str:
-    """A refusal as the service's ``message``: kind, detail and errors."""
+    """Return an error as the service's ``message``: kind, detail and errors."""
     return Problem.of(error).model_dump_json()
 
 
@@ -124,13 +116,13 @@ def _object(what: str, text: str) -> dict[str, Any]:
     data = parse_json(text)
     if not isinstance(data, dict):
         raise _refused(what, "data", data, "a JSON object")
-    if "\\u" in text and not _sayable(data):
+    if "\\u" in text and not _is_encodable(data):
         raise _refused(what, "data", "", "text must be Unicode; a lone surrogate is not a character")
     return data
 
 
-def _sayable(data: Any) -> bool:
-    """Whether what was escaped can be written again."""
+def _is_encodable(data: Any) -> bool:
+    """Return whether the escaped characters can be encoded again."""
     try:
         json.dumps(data, ensure_ascii=False).encode()
     except UnicodeEncodeError:
@@ -158,6 +150,6 @@ def _refused(what: str, field: str, value: Any, rule: str) -> MalformedMessage:
 
 
 def _as_sample(error: MalformedMessage) -> MalformedMessage:
-    """The fields of a sample have no index."""
+    """Return the error with fields that have no index, as a sample has none."""
     errors = tuple(e.model_copy(update={"field": e.field.removesuffix(".0")}) for e in error.errors)
     return MalformedMessage(f"gaze: {errors[0].field}: {errors[0].rule}", errors)

@@ -1,7 +1,7 @@
-"""The native backend: the protocol of ``rmw_zenoh`` on a Zenoh session of our own. No ROS needed here.
+"""The native backend: the protocol of ``rmw_zenoh`` on a Zenoh session. It needs no ROS.
 
-The session is another than the mesh's and meets the ROS nodes at their router. Callbacks run in Zenoh's
-thread, copy the bytes and hand over; everything is read in the loop.
+This session is not the mesh's: it meets the ROS nodes at their router. Callbacks run in Zenoh's thread and copy the
+bytes; the bridge's loop decodes them.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from typing import Any
 import zenoh
 from shift_runtime.bus.zenoh import direct
 from shift_runtime.bus.zenoh_config import zenoh_config
-from shift_schemas.errors import InvalidSettings, MalformedMessage, Problem, ShiftError, shorten
+from shift_schemas.errors import InvalidSettings, MalformedMessage, Problem, shorten
 
 from shift_ros2 import cdr, ros4hri
-from shift_ros2.backend import Handlers, Inbox, answer_of, stopped
+from shift_ros2.backend import BackendBase, Handlers, answer_of
 from shift_ros2.interfaces import INTERFACES, Interface
 from shift_ros2.rmw_zenoh import Attachment, Node, RosType, data_key, gid_of, hash_of, qos_text
 from shift_ros2.ros4hri import ENGAGEMENT, ENGAGEMENT_LEVEL, IDS_LIST, TRACKED
 from shift_ros2.settings import BridgeSettings
 
 OVERRIDE = "ZENOH_CONFIG_OVERRIDE"
-"""As ``rmw_zenoh`` reads it: ``path=value;path=value``, values in JSON."""
+"""``rmw_zenoh`` reads it too: ``path=value;path=value``, with values in JSON."""
 ENCODING = zenoh.Encoding.APPLICATION_CDR
 
 
@@ -46,24 +46,22 @@ class _Publisher:
         self.publisher.put(payload, attachment=attachment)
 
 
-class NativeBackend:
-    """See the module. Make it by :meth:`open`."""
+class NativeBackend(BackendBase):
+    """A node in the ROS graph over a Zenoh session. :meth:`open` makes one."""
 
     def __init__(self, session: zenoh.Session, settings: BridgeSettings, handlers: Handlers) -> None:
         self._session = session
         self._settings = settings
-        self._handlers = handlers
+        super().__init__(handlers)
         self._names = settings.names
-        self._inbox = Inbox(self._overflowed)
         self._node = Node(settings.domain, str(session.zid()), 0, settings.namespace, settings.node)
         self._entities = count(1)
         self._publishers: dict[str, _Publisher] = {}
         self._declared: list[Any] = []
-        self._answering: set[asyncio.Task[None]] = set()
 
     @classmethod
     async def open(cls, settings: BridgeSettings, handlers: Handlers) -> NativeBackend:
-        """Join the graph. A router that is not there yet is tried again in the background."""
+        """Join the graph. Zenoh retries a router that does not answer yet in the background."""
         config = ros_config(settings)
         try:
             session = await asyncio.to_thread(zenoh.open, config)
@@ -74,19 +72,19 @@ class NativeBackend:
         return backend
 
     def publish(self, topic: str, text: str) -> None:
-        """See :class:`~shift_ros2.backend.Backend`."""
-        if topic in self._publishers:  # after close there are none
+        """Publish a text on one of the interfaces."""
+        if topic in self._publishers:  # there are none after close
             self._publishers[topic].put(cdr.encode_string(text))
 
     @property
     def state(self) -> str:
-        """See :class:`~shift_ros2.backend.Backend`."""
+        """What the backend waits for, or an empty text."""
         met = list(self._session.info.routers_zid())
         return "" if met else f"for a Zenoh router for ROS at {self._settings.ros_router}"
 
     async def close(self) -> None:
-        """See :class:`~shift_ros2.backend.Backend`."""
-        await stopped(self._answering.copy())
+        """Leave the graph."""
+        await self._stop_answers()
         self._publishers.clear()
         for thing in reversed(self._declared):
             thing.undeclare()
@@ -96,7 +94,7 @@ class NativeBackend:
     # --- declarations ---
 
     def _declare(self) -> None:
-        """The data first, the tokens after it: who sees us can reach us."""
+        """Declare the data before the tokens, so that every peer that sees the node can reach it."""
         for interface in INTERFACES:
             match interface.direction:
                 case "in":
@@ -126,7 +124,7 @@ class NativeBackend:
         key = data_key(self._settings.domain, self._names[interface.topic], interface.type, written)
         publisher = self._session.declare_publisher(
             key, encoding=ENCODING, congestion_control=zenoh.CongestionControl.DROP,
-            # a link that observations fill lets a decision through
+            # a decision passes observations that fill a link
             priority=zenoh.Priority.DATA_HIGH if interface.topic == "decision" else zenoh.Priority.DATA,
         )  # fmt: skip
         token = self._entity("MP", interface)
@@ -147,11 +145,11 @@ class NativeBackend:
         self._token(self._entity("SS", interface))
 
     def _listen(self, name: str, kind: RosType, take: Callable[[str, bytes], None]) -> None:
-        """Hear a topic of other packages, where somebody publishes it."""
+        """Subscribe to a topic of another package."""
 
         def on_sample(sample: zenoh.Sample) -> None:
             key, payload, _ = _copied(sample)
-            self._inbox.put(name, lambda: self._guarded(name, lambda: take(key, payload)))
+            self._inbox.put(name, lambda: self._handle(name, lambda: take(key, payload)))
 
         key = data_key(self._settings.domain, name, kind, "*")
         self._declared.append(self._session.declare_subscriber(key, direct(on_sample)))
@@ -166,7 +164,7 @@ class NativeBackend:
     def _token(self, key: str) -> None:
         self._declared.append(self._session.liveliness().declare_token(key))
 
-    # --- arrivals; all in the loop ---
+    # --- arrivals, in the loop ---
 
     def _take_text(self, topic: str, kind: RosType, key: str, payload: bytes, attachment: bytes | None) -> None:
         def take() -> None:
@@ -174,7 +172,7 @@ class NativeBackend:
             _attachment_of(attachment)
             self._handlers.on_text(topic, cdr.decode_string(payload))
 
-        self._guarded(topic, take)
+        self._handle(topic, take)
 
     def _take_request(self, interface: Interface, query: zenoh.Query) -> None:
         try:
@@ -186,9 +184,7 @@ class NativeBackend:
             query.reply_err(Problem.of(e).model_dump_json())
             query.drop()  # type: ignore[no-untyped-call]
             return
-        task = asyncio.get_running_loop().create_task(self._answer(query, attachment))
-        self._answering.add(task)
-        task.add_done_callback(self._answering.discard)
+        self._start_answer(self._answer(query, attachment))
 
     async def _answer(self, query: zenoh.Query, attachment: Attachment) -> None:
         try:
@@ -205,24 +201,14 @@ class NativeBackend:
     def _on_engagement(self, key: str, payload: bytes) -> None:
         self._handlers.on_engagement(ros4hri.person_of(key.partition("/")[2]), ros4hri.level_of(payload))
 
-    def _guarded(self, topic: str, take: Callable[[], None]) -> None:
-        try:
-            take()
-        except ShiftError as e:
-            self._handlers.on_lost(topic, e)
-
     def _check(self, kind: RosType, key: str) -> None:
         written = hash_of(key)
         if not kind.fits(written):
             raise MalformedMessage(f"type hash {shorten(written)}: {kind.name} is {kind.hash}")
 
-    def _overflowed(self, topic: str, number: int) -> None:
-        error = ShiftError("messages came faster than the bridge could read them; some were dropped")
-        self._handlers.on_lost(topic, error, number, reason="overload")
-
 
 def ros_config(settings: BridgeSettings) -> zenoh.Config:
-    """As ``rmw_zenoh`` opens its sessions; without a listener as a client, whose router passes everything on."""
+    """Return the configuration that ``rmw_zenoh`` uses; without a listener, the session is a client of its router."""
     mode = "peer" if settings.ros_listen else "client"
     try:
         config = zenoh_config(mode, connect=settings.ros_router, listen=settings.ros_listen)

@@ -1,8 +1,8 @@
-"""The rclpy backend: an ordinary ROS node, over whatever RMW is installed. ``rclpy`` is imported late.
+"""The rclpy backend: an ordinary ROS node over the RMW that is installed. ``rclpy`` is imported late.
 
-Names, parameters and remaps are ours (settings), so both backends take the same command line. One thread
-spins and hands over what arrives; answers are sent from the loop, and gaze is taken meanwhile. Coroutines in
-rclpy would be polled without a pause.
+The bridge's settings resolve names, parameters and remaps, so that both backends take the same command line. One
+thread spins and passes on what arrives; answers are sent from the loop, so that gaze is received meanwhile. rclpy
+would poll coroutines without a pause, so none are used.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from functools import partial
 from typing import Any
 
 import structlog
-from shift_schemas.errors import InvalidSettings, ShiftError
+from shift_schemas.errors import InvalidSettings
 
-from shift_ros2.backend import Answer, Handlers, Inbox, answer_of, away, stopped
+from shift_ros2.backend import Answer, BackendBase, Handlers, answer_of, unavailable_answer
 from shift_ros2.interfaces import INTERFACES, Interface
 from shift_ros2.ros4hri import TRACKED
 from shift_ros2.settings import BridgeSettings
@@ -27,17 +27,14 @@ PAUSE_S = 0.1
 STOP_S = 5.0
 
 
-class RclpyBackend:
-    """See the module. Make it by :meth:`open`."""
+class RclpyBackend(BackendBase):
+    """A node in the ROS graph made by rclpy. :meth:`open` makes one."""
 
     def __init__(self, settings: BridgeSettings, handlers: Handlers, ros: Any) -> None:
         self._settings = settings
-        self._handlers = handlers
+        super().__init__(handlers)
         self._ros = ros
-        self._loop = asyncio.get_running_loop()
-        self._inbox = Inbox(self._overflowed)
         self._publishers: dict[str, Any] = {}
-        self._answering: set[asyncio.Task[None]] = set()
         self._engagements: set[str] = set()
         self._closing = False
 
@@ -49,19 +46,19 @@ class RclpyBackend:
         return backend
 
     def publish(self, topic: str, text: str) -> None:
-        """See :class:`~shift_ros2.backend.Backend`."""
+        """Publish a text on one of the interfaces."""
         if not self._closing:
             self._publishers[topic].publish(self._ros.String(data=text))
 
     @property
     def state(self) -> str:
-        """See :class:`~shift_ros2.backend.Backend`. A ROS graph has no place that one could wait for."""
+        """Always empty: a ROS graph has no place to wait for."""
         return ""
 
     async def close(self) -> None:
-        """See :class:`~shift_ros2.backend.Backend`."""
+        """Leave the graph."""
         self._closing = True
-        await stopped(self._answering.copy())
+        await self._stop_answers()
         await asyncio.to_thread(self._stop)
 
     # --- life ---
@@ -92,7 +89,7 @@ class RclpyBackend:
                 self._executor.spin_once(0.5)
             except self._ros.ExternalShutdownException:
                 return
-            except Exception:  # of a message that rclpy cannot read; the others are not to be lost with it
+            except Exception:  # a message that rclpy cannot read must not cost the others
                 log.exception("rclpy failed")
                 time.sleep(PAUSE_S)
 
@@ -123,20 +120,20 @@ class RclpyBackend:
             reliability=policy.RELIABLE if word == "reliable" else policy.BEST_EFFORT,
         )
 
-    # --- arrivals, in rclpy's thread; handed over to the loop ---
+    # --- arrivals in rclpy's thread, passed on to the loop ---
 
     def _on_message(self, topic: str) -> Callable[[Any], None]:
         def on_message(message: Any) -> None:
             text = message.data
-            self._inbox.put(topic, lambda: self._guarded(topic, lambda: self._handlers.on_text(topic, text)))
+            self._inbox.put(topic, lambda: self._handle(topic, lambda: self._handlers.on_text(topic, text)))
 
         return on_message
 
     def _serve(self, name: str) -> None:
-        """Take requests without waiting for their answers, which go out from the loop.
+        """Take requests without waiting for their answers, which are sent from the loop.
 
-        rclpy sends what the callback gives back, which is nothing yet; so the service's own ``send_response`` is
-        replaced by one that keeps the request's header for later.
+        rclpy sends what the callback returns, and the answer is not known then. So the service's ``send_response``
+        is replaced by a function that keeps the request's header for later.
         """
         service = self._node.create_service(self._ros.Trigger, name, lambda _, response: response)
         self._send = service.send_response
@@ -144,7 +141,7 @@ class RclpyBackend:
 
     def _on_request(self, response: Any, header: Any) -> None:
         if not self._inbox.put("next_strategy", lambda: self._ask(response, header)):
-            self._reply(response, header, away())
+            self._reply(response, header, unavailable_answer())
 
     # --- in the loop ---
 
@@ -152,25 +149,13 @@ class RclpyBackend:
         async def answer() -> None:
             self._reply(response, header, await answer_of(self._handlers, None))
 
-        task = self._loop.create_task(answer())
-        self._answering.add(task)
-        task.add_done_callback(self._answering.discard)
+        self._start_answer(answer())
 
     def _reply(self, response: Any, header: Any, answer: Answer) -> None:
         response.success, response.message = answer
         self._send(response, header)
 
-    def _guarded(self, topic: str, take: Callable[[], None]) -> None:
-        try:
-            take()
-        except ShiftError as e:
-            self._handlers.on_lost(topic, e)
-
-    def _overflowed(self, topic: str, number: int) -> None:
-        error = ShiftError("messages came faster than the bridge could read them; some were dropped")
-        self._handlers.on_lost(topic, error, number, reason="overload")
-
-    # --- ROS4HRI, where hri_msgs is installed ---
+    # --- ROS4HRI, if hri_msgs is installed ---
 
     def _declare_ros4hri(self) -> None:
         try:
@@ -180,7 +165,7 @@ class RclpyBackend:
 
         def on_tracked(message: Any) -> None:
             ids = [str(i) for i in message.ids][:256]
-            self._inbox.put(TRACKED, lambda: self._guarded(TRACKED, lambda: self._handlers.on_tracked(ids)))
+            self._inbox.put(TRACKED, lambda: self._handle(TRACKED, lambda: self._handlers.on_tracked(ids)))
             for person in ids:
                 if person not in self._engagements and len(self._engagements) < 256:
                     self._engagements.add(person)
@@ -190,7 +175,7 @@ class RclpyBackend:
         def on_engagement(person: str) -> Callable[[Any], None]:
             def on_level(message: Any) -> None:
                 take = partial(self._handlers.on_engagement, person, int(message.level))
-                self._inbox.put(TRACKED, lambda: self._guarded(TRACKED, take))
+                self._inbox.put(TRACKED, lambda: self._handle(TRACKED, take))
 
             return on_level
 
@@ -198,7 +183,7 @@ class RclpyBackend:
 
 
 def _ros() -> Any:
-    """What the backend uses of ROS, in one place."""
+    """Return the parts of ROS that the backend uses. Raise :class:`InvalidSettings` without ROS."""
     try:
         import rclpy
         from rclpy.context import Context
@@ -222,7 +207,7 @@ def _ros() -> Any:
 
 
 def _executor() -> Any:
-    """The executor that needs no wait set, where rclpy has it (from Jazzy on): a call through it is 0.5 ms shorter."""
+    """Return the executor without a wait set if rclpy has it (from Jazzy on): a call is 0.5 ms shorter."""
     try:
         from rclpy.experimental import EventsExecutor
     except ImportError:

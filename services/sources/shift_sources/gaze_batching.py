@@ -1,29 +1,38 @@
-"""Single gaze samples become chunks; what has no number gets one. Pure: the shell says when to take.
+"""Single gaze samples become chunks, and chunks without a number get one. Pure: the caller decides when to take.
 
-A lane is the gaze of one session, in its order of arrival: a source that begins to speak takes over, so what the
-former one said must be in before. Chunks that a source numbered itself pass as they are; unnumbered ones are
-joined, since chunks of ten carry 3.5 times the samples (DESIGN.md).
+A buffer holds the gaze of one session in its order of arrival. A source that begins to send replaces the one before,
+so the gaze of the former source must be sent first. Chunks that a source numbered itself pass unchanged. Chunks
+without a number are joined: chunks of ten carry 3.5 times as many samples a second (docs/design.md).
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict, deque
+from typing import NamedTuple
 
 from shift_schemas.errors import FieldError, MalformedMessage, shorten
 from shift_schemas.messages import GazeChunk
 
-from shift_ros2.mapping import COLUMNS, GazeArrival
+COLUMNS = ("t", "x", "y", "valid", "aoi")
+"""The fields of a chunk that hold one value for each sample."""
+MOST_SOURCES = 256
+"""How many sources are remembered. The monitor still compares the times of an older source; this module does not."""
 
-SOURCES = 256
-"""So many sources are remembered; of an older one the times are no longer compared here, only by the monitor."""
+
+class GazeArrival(NamedTuple):
+    """Gaze as it arrived. If it came without ``seq``, the chunk's is 0 and the forwarder numbers it."""
+
+    session: str | None
+    chunk: GazeChunk
+    numbered: bool
 
 
-class Lane:
-    """What waits of one session."""
+class GazeBuffer:
+    """The gaze of one session that waits to be sent."""
 
     def __init__(self) -> None:
         self.samples = 0
-        """Samples that wait."""
+        """How many samples wait."""
         self._waiting: deque[GazeArrival] = deque()
         self._last_t: OrderedDict[str, float] = OrderedDict()
 
@@ -31,7 +40,7 @@ class Lane:
         return bool(self._waiting)
 
     def add(self, arrival: GazeArrival) -> None:
-        """Take it in. Raises :class:`MalformedMessage` for a time that does not rise: it would spoil its chunk."""
+        """Add an arrival. Raise :class:`MalformedMessage` if its time does not rise: it would spoil its chunk."""
         t, source = arrival.chunk.t, arrival.chunk.source
         last = self._last_t.get(source)
         if not arrival.numbered and last is not None and t[0] <= last:
@@ -39,20 +48,23 @@ class Lane:
             raise MalformedMessage(f"gaze: t: {rule}", (FieldError(field="t", value=shorten(t[0]), rule=rule),))
         self._last_t[source] = t[-1]
         self._last_t.move_to_end(source)
-        if len(self._last_t) > SOURCES:
+        if len(self._last_t) > MOST_SOURCES:
             self._last_t.popitem(last=False)
         self.samples += len(t)
         self._waiting.append(arrival)
 
-    def ripe(self, samples: int) -> bool:
-        """Whether there is no sense in waiting for more: it has its number, or there are so many samples."""
+    def is_ready(self, samples: int) -> bool:
+        """Return whether to send now: the first arrival has a number, or ``samples`` samples wait."""
         return bool(self._waiting) and (self._waiting[0].numbered or self.samples >= samples)
 
     def take(self, limit: int) -> list[GazeArrival]:
-        """What makes the next chunk: one that is numbered, or unnumbered ones of a kind, of ``limit`` samples."""
+        """Remove and return the arrivals of the next chunk.
+
+        That is one arrival with a number, or arrivals of one kind without a number, of ``limit`` samples at most.
+        """
         taken = [self._waiting.popleft()]
         count = len(taken[0].chunk.t)
-        while not taken[0].numbered and self._waiting and _alike(taken[0], self._waiting[0]):
+        while not taken[0].numbered and self._waiting and _can_join(taken[0], self._waiting[0]):
             count += len(self._waiting[0].chunk.t)
             if count > limit:
                 break
@@ -61,8 +73,8 @@ class Lane:
         return taken
 
 
-def joined(arrivals: list[GazeArrival], seq: int) -> GazeChunk:
-    """Unnumbered gaze of one kind as one chunk."""
+def join(arrivals: list[GazeArrival], seq: int) -> GazeChunk:
+    """Return arrivals of one kind as one chunk with the number ``seq``."""
     first = arrivals[0].chunk
     columns = {
         name: [value for a in arrivals for value in getattr(a.chunk, name)]
@@ -72,6 +84,6 @@ def joined(arrivals: list[GazeArrival], seq: int) -> GazeChunk:
     return GazeChunk(source=first.source, seq=seq, **columns)
 
 
-def _alike(a: GazeArrival, b: GazeArrival) -> bool:
+def _can_join(a: GazeArrival, b: GazeArrival) -> bool:
     same = a.chunk.source == b.chunk.source and not b.numbered
     return same and all((getattr(a.chunk, n) is None) == (getattr(b.chunk, n) is None) for n in COLUMNS)

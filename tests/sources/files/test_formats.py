@@ -1,15 +1,20 @@
-"""Reading Tobii TX300 and Titta tables."""
+"""Reading gaze files: tables of the Tobii TX300 and of Titta."""
 
 from __future__ import annotations
 
 import gzip
+from itertools import accumulate
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
-from shift_cli.gaze_files import Sample, chunks, samples
+from hypothesis import given
+from hypothesis import strategies as st
 from shift_schemas.errors import InvalidSettings, MalformedMessage
+from shift_sources.files.formats import read_samples
+from shift_sources.files.samples import Sample, chunks
 
-RECORDINGS = sorted((Path(__file__).parents[1] / "data" / "gaze").glob("*.tsv.gz"))
+RECORDINGS = sorted((Path(__file__).parents[2] / "data" / "gaze").glob("*.tsv.gz"))
 TX300 = "Time\tLGazePos2dx\tLGazePos2dy\tLValidity\tRGazePos2dx\tRGazePos2dy\tRValidity\n"
 TITTA = "\t".join(
     ["", "device_time_stamp", "system_time_stamp"]
@@ -24,12 +29,12 @@ TITTA = "\t".join(
 def read(tmp_path: Path, text: str) -> list[Sample]:
     path = tmp_path / "gaze.tsv"
     path.write_text(text)
-    return list(samples(path))
+    return list(read_samples(path))
 
 
 @pytest.mark.parametrize("path", RECORDINGS, ids=lambda p: p.name)
 def test_a_real_recording_reads_whole(path: Path) -> None:
-    found = list(samples(path))
+    found = list(read_samples(path))
     with gzip.open(path, "rt") as lines:
         assert len(found) == len(lines.readlines()) - 1
     assert found[0].t == 0.0
@@ -77,11 +82,11 @@ def test_plain_and_gzip_are_told_apart_by_content(tmp_path: Path) -> None:
     plain, zipped = tmp_path / "a.gz", tmp_path / "b.tsv"
     plain.write_text(text)
     zipped.write_bytes(gzip.compress(text.encode()))
-    assert list(samples(plain)) == list(samples(zipped))
+    assert list(read_samples(plain)) == list(read_samples(zipped))
 
 
 def test_chunks_are_numbered_and_hold_all_samples() -> None:
-    taken = list(samples(RECORDINGS[0]))
+    taken = list(read_samples(RECORDINGS[0]))
     found = list(chunks(taken, 10, source="tx300"))
     assert [c.seq for c in found] == list(range(66))
     assert {c.source for c in found} == {"tx300"}
@@ -120,10 +125,50 @@ def test_a_file_that_is_damaged_binary_or_missing_says_so(tmp_path: Path) -> Non
     cut = tmp_path / "cut.tsv.gz"
     cut.write_bytes(RECORDINGS[0].read_bytes()[:20_000])
     with pytest.raises(MalformedMessage, match="cut off"):
-        list(samples(cut))
+        list(read_samples(cut))
     binary = tmp_path / "binary.tsv"
     binary.write_bytes(bytes(range(128, 256)))
     with pytest.raises(MalformedMessage, match="not text"):
-        list(samples(binary))
+        list(read_samples(binary))
     with pytest.raises(InvalidSettings, match=r"missing\.tsv"):
-        list(samples(tmp_path / "missing.tsv"))
+        list(read_samples(tmp_path / "missing.tsv"))
+
+
+# --- written and read again ---
+
+coordinates = st.floats(-0.5, 1.5, allow_nan=False).map(lambda v: round(v, 4))
+eyes = st.one_of(st.none(), st.tuples(coordinates, coordinates))
+rows = st.lists(st.tuples(st.integers(1, 20_000), eyes, eyes), min_size=1, max_size=30)
+Eyes = list[tuple[int, tuple[float, float] | None, tuple[float, float] | None]]
+
+
+def expected(written: Eyes) -> list[Sample]:
+    times = list(accumulate(step for step, _, _ in written))
+    samples = []
+    for t, (_, left, right) in zip(times, written, strict=True):
+        seen = [eye for eye in (left, right) if eye is not None]
+        x, y = ((sum(e[i] for e in seen) / len(seen)) if seen else None for i in (0, 1))
+        samples.append(Sample((t - times[0]) / 1_000_000, x, y, bool(seen)))
+    return samples
+
+
+@given(rows)
+def test_written_tx300_table_is_read_again(written: Eyes) -> None:
+    lines, t = [], 0
+    for step, left, right in written:
+        t += step
+        cells = [f"{e[0]}\t{e[1]}\t0" if e is not None else "-1.0\t-1.0\t4" for e in (left, right)]
+        lines.append(f"{t}\t{cells[0]}\t{cells[1]}")
+    with TemporaryDirectory() as folder:
+        assert read(Path(folder), TX300 + "\n".join(lines) + "\n") == expected(written)
+
+
+@given(rows)
+def test_written_titta_table_is_read_again(written: Eyes) -> None:
+    lines, t = [], 0
+    for i, (step, left, right) in enumerate(written):
+        t += step
+        cells = [f"{e[0]}\t{e[1]}\tTrue" if e is not None else "nan\tnan\tFalse" for e in (left, right)]
+        lines.append(f"{i}\t{t}\t{t + 7}\t{cells[0]}\t{cells[1]}")
+    with TemporaryDirectory() as folder:
+        assert read(Path(folder), TITTA + "\n" + "\n".join(lines) + "\n") == expected(written)

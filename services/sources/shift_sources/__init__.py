@@ -1,0 +1,1 @@
+"""Gaze from outside the mesh: readers of files, batching and forwarding."""

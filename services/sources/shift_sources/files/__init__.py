@@ -1,0 +1,1 @@
+"""Readers of gaze files: one module for each format, listed in ``formats``."""
