@@ -1,4 +1,4 @@
-"""The learner's core as a fold over a session: against a naive loop, and across restarts."""
+"""The learner's core as a fold over a session, compared with a naive loop and across restarts."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ ACTIONS = Study(study="x").scoring.actions
 
 
 def session(state: Any = "live") -> Session:
-    """The session's fact in one of its states."""
+    """Return the session fact in one of its states."""
     return Session(
         session="s1", stamp=NOW, participant="P01", study="x", seed=7, state=state, started=NOW, format=FORMAT
     )  # fmt: skip
 
 
 def config(version: int = 1, **learner: Any) -> Config:
-    """A configuration with these settings of the learner."""
+    """Return a configuration with these settings of the learner."""
     return Config(
         session="s1", stamp=NOW, version=version, study=study_json(study_of({"study": "x", "learner": learner}))
     )
 
 
 def decision(n: int, action: int = 0, triple: Triple = FOCUSED, overridden: bool = False) -> Decision:
-    """The ``n``-th decision."""
+    """Return the ``n``-th decision."""
     scoring = Study(study="x").scoring
     found = reduce(scoring, triple)
     return Decision(
@@ -68,7 +68,7 @@ def decision(n: int, action: int = 0, triple: Triple = FOCUSED, overridden: bool
 
 
 def report(n: int, understood: bool = True, able: bool = True, seconds: float = 5.0, **need: int) -> ReportPerformance:
-    """How the task of the ``n``-th decision went."""
+    """Return the report of the ``n``-th decision."""
     return ReportPerformance(
         command_id=f"d{n}", session="s1", need=Seen(**need),
         comprehension=Result(success=understood, duration_s=seconds),
@@ -77,7 +77,7 @@ def report(n: int, understood: bool = True, able: bool = True, seconds: float = 
 
 
 def folded(*messages: Any) -> tuple[LearnerState, list[Fact]]:
-    """The state and all the facts after these messages."""
+    """Return the state after these messages, and all facts."""
     state: LearnerState | None = None
     facts: list[Fact] = []
     for message in messages:
@@ -88,13 +88,13 @@ def folded(*messages: Any) -> tuple[LearnerState, list[Fact]]:
     return state, facts
 
 
-def begun(**learner: Any) -> LearnerState:
-    """A session that has its configuration."""
+def configured_session(**learner: Any) -> LearnerState:
+    """Return the state of a session that has its configuration."""
     return folded(session(), config(**learner))[0]
 
 
 def of_kind(facts: Any, kind: Any) -> Any:
-    """The only fact of that kind."""
+    """Return the only fact of this kind."""
     (found,) = [f for f in facts if isinstance(f, kind)]
     return found
 
@@ -102,7 +102,7 @@ def of_kind(facts: Any, kind: Any) -> Any:
 # --- a policy after each input, for one decision number ---
 
 
-def test_the_first_policy_comes_with_the_configuration_and_is_for_decision_1() -> None:
+def test_configuration_publishes_the_first_policy_for_decision_1() -> None:
     _, facts = folded(session(), config())
     policy = of_kind(facts, Policy)
     assert (policy.version, policy.for_n, policy.epsilon, policy.cumulative_reward) == (1, 1, 0.75, 0.0)
@@ -112,8 +112,8 @@ def test_the_first_policy_comes_with_the_configuration_and_is_for_decision_1() -
     assert [tuple(a.values()) for a in policy.actions] == list(ACTIONS)
 
 
-def test_each_decision_and_each_report_is_followed_by_a_policy_that_says_what_it_had_seen() -> None:
-    state = begun()
+def test_each_decision_and_each_report_publishes_a_policy_with_its_inputs() -> None:
+    state = configured_session()
     for message, for_n, seen in (
         (decision(1), 2, Seen(decision=1, config=1)),
         (report(1), 2, Seen(decision=1, performance=1, config=1)),
@@ -128,7 +128,7 @@ def test_each_decision_and_each_report_is_followed_by_a_policy_that_says_what_it
     assert policy.epsilon == 0.5 * 0.98
 
 
-def test_a_report_gives_performance_transition_and_policy() -> None:
+def test_report_publishes_performance_transition_and_policy() -> None:
     state, _ = folded(session(), config(), decision(1, action=2))
     step = core.step(state, report(1, understood=True, able=False, seconds=5.0), NOW)
     performance, transition, policy = step.facts
@@ -157,9 +157,10 @@ def test_rewards_add_up() -> None:
     assert of_kind(step.facts, Policy).cumulative_reward == 0.0
 
 
-def test_an_override_counts_as_taken_is_learned_from_and_has_no_propensity() -> None:
+def test_override_counts_as_taken_is_learned_and_has_no_propensity() -> None:
     state, facts = folded(session(), config(), decision(1, action=3, overridden=True))
-    assert facts[-1].states["unfocused"].probabilities[3] == pytest.approx(1 - 0.75 * 0.99), "greedy only: it is taken"  # type: ignore[attr-defined]
+    row = of_kind(facts[-1:], Policy).states["unfocused"]
+    assert row.probabilities[3] == pytest.approx(1 - 0.75 * 0.99), "an action that was taken has the greedy part only"
     step = core.step(state, report(1, seconds=0.0), NOW)
     transition = of_kind(step.facts, Transition)
     assert transition.propensity is None
@@ -167,22 +168,22 @@ def test_an_override_counts_as_taken_is_learned_from_and_has_no_propensity() -> 
     assert of_kind(step.facts, Policy).states["engaged_observer"].visits == [0, 0, 0, 1, 0, 0]
 
 
-# --- what cannot be carried out ---
+# --- refused reports ---
 
 
-def test_without_its_decision_a_report_waits_for_the_decider_and_then_is_unknown() -> None:
+def test_report_without_its_decision_waits_for_the_decider_and_is_then_refused() -> None:
     with pytest.raises(InputsMissing) as waiting:
-        core.step(begun(), report(1), NOW)
+        core.step(configured_session(), report(1), NOW)
     assert waiting.value.owners == ("decider",)
     with pytest.raises(UnknownThing, match="no decision d1"):
-        core.step(begun(), report(1), NOW, timed_out=True)
+        core.step(configured_session(), report(1), NOW, timed_out=True)
 
 
-def test_while_the_learner_cannot_know_it_is_unavailable_and_never_unknown() -> None:
+def test_learner_that_lacks_inputs_is_unavailable_instead_of_refusing() -> None:
     with pytest.raises(InputsMissing):
-        core.step(begun(), report(1, decision=1), NOW)
+        core.step(configured_session(), report(1, decision=1), NOW)
     with pytest.raises(Unavailable, match="decider"):
-        core.step(begun(), report(1, decision=1), NOW, timed_out=True)
+        core.step(configured_session(), report(1, decision=1), NOW, timed_out=True)
     bare, _ = folded(session())
     with pytest.raises(InputsMissing) as waiting:
         core.step(bare, report(1), NOW)
@@ -191,7 +192,7 @@ def test_while_the_learner_cannot_know_it_is_unavailable_and_never_unknown() -> 
         core.step(bare, report(1), NOW, timed_out=True)
 
 
-def test_a_report_waits_for_the_configuration_that_was_answered_before_it() -> None:
+def test_report_waits_for_the_configuration_that_was_answered_before_it() -> None:
     state, _ = folded(session(), config(), decision(1))
     with pytest.raises(InputsMissing) as waiting:
         core.step(state, report(1, config=2), NOW)
@@ -199,7 +200,7 @@ def test_a_report_waits_for_the_configuration_that_was_answered_before_it() -> N
     assert core.step(state, report(1, config=2), NOW, timed_out=True).facts
 
 
-def test_nothing_is_taken_without_a_session_or_after_its_end() -> None:
+def test_report_without_a_session_or_after_its_end_is_refused() -> None:
     with pytest.raises(UnknownThing):
         core.step(None, report(1), NOW)
     state, _ = folded(session(), config(), decision(1), session("ending"))
@@ -207,7 +208,7 @@ def test_nothing_is_taken_without_a_session_or_after_its_end() -> None:
         core.step(state, report(1), NOW)
 
 
-def test_a_decision_is_reported_once() -> None:
+def test_second_report_of_a_decision_is_refused() -> None:
     state, _ = folded(session(), config(), decision(1), report(1))
     with pytest.raises(UnknownThing):
         core.step(state, report(1), NOW, timed_out=True)
@@ -216,13 +217,13 @@ def test_a_decision_is_reported_once() -> None:
         core.step(waiting, report(1), NOW)
 
 
-def test_a_decision_before_the_configuration_is_read_again_later() -> None:
+def test_decision_before_the_configuration_is_unavailable() -> None:
     bare, _ = folded(session())
     with pytest.raises(Unavailable):
         core.step(bare, decision(1), NOW)
 
 
-def test_an_unknown_learner_is_refused_with_those_that_there_are() -> None:
+def test_unknown_learner_is_refused_and_the_learners_are_listed() -> None:
     with pytest.raises(InvalidStudy, match="there is no learner 'deep'; write one of "):
         learner_named("deep")
 
@@ -230,18 +231,18 @@ def test_an_unknown_learner_is_refused_with_those_that_there_are() -> None:
 # --- a discount above 0 ---
 
 
-def test_with_a_discount_the_transition_waits_for_the_next_decision() -> None:
+def test_transition_with_a_discount_waits_for_the_next_decision() -> None:
     state, _ = folded(session(), config(discount=0.5), decision(1, action=0))
     step = core.step(state, report(1, seconds=0.0), NOW)
     assert [type(f) for f in step.facts] == [Performance, Policy]
-    assert of_kind(step.facts, Policy).states["engaged_observer"].values[0] == 1.0, "nothing learned yet"
+    assert of_kind(step.facts, Policy).states["engaged_observer"].values[0] == 1.0, "nothing is learned yet"
     after = core.step(step.state, decision(2, triple=Triple("low", "distracted", "failure")), NOW)
     assert [type(f) for f in after.facts] == [Transition, Policy]
     assert of_kind(after.facts, Transition).decision_id == "d1"
     assert of_kind(after.facts, Transition).value == 1.0 + 0.25 * (1.0 + 0.5 * 1.0 - 1.0)
 
 
-def test_what_waits_at_the_session_s_end_is_learned_without_a_next_one() -> None:
+def test_waiting_report_is_learned_at_the_end_of_the_session() -> None:
     state, _ = folded(session(), config(discount=0.5), decision(1, action=1), report(1, seconds=0.0))
     step = core.step(state, session("ending"), NOW)
     assert [type(f) for f in step.facts] == [Transition, Policy]
@@ -249,12 +250,12 @@ def test_what_waits_at_the_session_s_end_is_learned_without_a_next_one() -> None
     assert core.step(step.state, session("ended"), NOW).facts == ()
 
 
-def test_without_anything_waiting_the_end_puts_nothing_out() -> None:
+def test_end_of_a_session_without_waiting_reports_publishes_nothing() -> None:
     state, _ = folded(session(), config(), decision(1), report(1))
     assert core.step(state, session("ending"), NOW).facts == ()
 
 
-def test_the_state_that_followed_is_remembered_though_its_own_result_came_first() -> None:
+def test_next_state_is_remembered_if_its_own_report_comes_first() -> None:
     low = Triple("low", "distracted", "failure")
     messages = (session(), config(discount=0.5), decision(1), decision(2, action=1, triple=low), decision(3))
     state, _ = folded(*messages, report(2, understood=False, able=False, seconds=0.0))
@@ -269,7 +270,7 @@ def test_the_state_that_followed_is_remembered_though_its_own_result_came_first(
 
 @dataclass
 class Naive:
-    """The same session, by hand."""
+    """The same session as a naive loop."""
 
     rate: float
     discount: float
@@ -307,7 +308,7 @@ histories = st.lists(decides | reports, max_size=30)
 
 
 def messages_of(history: list[Any]) -> list[Any]:
-    """Decisions, and reports of decisions that are still open."""
+    """Return decisions, and reports of decisions that are still open."""
     messages: list[Any] = []
     open_ones: list[int] = []
     n = 0
@@ -324,9 +325,9 @@ def messages_of(history: list[Any]) -> list[Any]:
 
 @settings(deadline=None, max_examples=60)
 @given(histories, st.sampled_from([0.0, 0.5, 1.0]), st.floats(0, 1), st.booleans())
-def test_the_values_are_those_of_a_naive_loop(history: list[Any], discount: float, rate: float, prior: bool) -> None:
+def test_values_match_a_naive_loop(history: list[Any], discount: float, rate: float, prior: bool) -> None:
     naive = Naive(rate, discount, [[float(prior and a == s) for a in range(6)] for s in range(6)])
-    state = begun(discount=discount, learning_rate=rate, scoring_prior=prior)
+    state = configured_session(discount=discount, learning_rate=rate, scoring_prior=prior)
     names = Study(study="x").scoring.states
     decided, taken = 0, set()
     for message in [*messages_of(history), session("ending")]:
@@ -358,7 +359,7 @@ def test_the_values_are_those_of_a_naive_loop(history: list[Any], discount: floa
 @given(
     histories, st.integers(0, 30), st.sampled_from([0.0, 0.5]), st.sampled_from(["q-learning", "scoring", "thompson"])
 )
-def test_a_restart_at_any_point_changes_nothing(history: list[Any], at: int, discount: float, name: str) -> None:
+def test_restart_at_any_point_changes_nothing(history: list[Any], at: int, discount: float, name: str) -> None:
     messages = [session(), config(discount=discount, name=name), *messages_of(history), session("ending")]
     living: LearnerState | None = None
     restarted: LearnerState | None = None
@@ -376,7 +377,7 @@ def test_a_restart_at_any_point_changes_nothing(history: list[Any], at: int, dis
 
 @settings(deadline=None, max_examples=30)
 @given(histories)
-def test_a_refused_command_leaves_the_state_as_it_was(history: list[Any]) -> None:
+def test_refused_command_changes_no_state(history: list[Any]) -> None:
     state, _ = folded(session(), config(), *messages_of(history))
     before = core.dump(state)
     for timed_out in (False, True):
@@ -389,12 +390,12 @@ def test_a_refused_command_leaves_the_state_as_it_was(history: list[Any]) -> Non
 
 
 def correction(n: int, understood: bool = True, able: bool = True, seconds: float = 5.0) -> ReportPerformance:
-    """Another report of the ``n``-th decision, in the place of the one before it."""
-    told = report(n, understood, able, seconds)
-    return told.model_copy(update={"command_id": f"c-{n}", "corrects": f"d{n}"})
+    """Return a correction of the report of the ``n``-th decision."""
+    changed = report(n, understood, able, seconds)
+    return changed.model_copy(update={"command_id": f"c-{n}", "corrects": f"d{n}"})
 
 
-def test_a_correction_is_recorded_beside_the_first_report_and_counts_in_its_place() -> None:
+def test_correction_is_recorded_in_addition_and_counts_instead() -> None:
     state, facts = folded(session(), config(), decision(1), report(1, False, False), decision(2), report(2))
     first, second = [f for f in facts if isinstance(f, Performance)]
     done = core.step(state, correction(1, True, True, 2.0), NOW)
@@ -407,7 +408,7 @@ def test_a_correction_is_recorded_beside_the_first_report_and_counts_in_its_plac
 
 
 @pytest.mark.parametrize("name", ["q-learning", "epsilon-greedy", "ucb1", "thompson", "linear-thompson", "planner"])
-def test_a_correction_is_learned_from_once_more(name: str) -> None:
+def test_correction_is_learned_in_addition(name: str) -> None:
     state, _ = folded(session(), config(name=name), decision(1), report(1, False, False))
     learner, memory = learner_named(name), state.memory
     done = core.step(state, correction(1), NOW)
@@ -416,7 +417,7 @@ def test_a_correction_is_learned_from_once_more(name: str) -> None:
     assert learner.dump(done.state.memory) == learner.dump(naive)
 
 
-def test_a_correction_of_what_waits_for_the_next_decision_is_learned_from_in_its_place() -> None:
+def test_correction_of_a_waiting_report_is_learned_instead_of_it() -> None:
     start = (session(), config(discount=0.9), decision(1), report(1, False, False))
     _, corrected = folded(*start, correction(1), decision(2))
     _, right_at_once = folded(*start[:3], report(1), decision(2))
@@ -424,14 +425,14 @@ def test_a_correction_of_what_waits_for_the_next_decision_is_learned_from_in_its
     assert (once.reward, once.value) == (other.reward, other.value)
 
 
-def test_a_correction_with_a_discount_is_learned_from_with_the_decision_that_followed() -> None:
+def test_correction_with_a_discount_is_learned_with_the_decision_that_followed() -> None:
     state, _ = folded(session(), config(discount=0.9), decision(1), report(1, False, False), decision(2))
     assert state.reported["d1"].open.following is not None
     facts = core.step(state, correction(1), NOW).facts
     assert [type(f).__name__ for f in facts] == ["Performance", "Transition", "Policy"]
 
 
-def test_the_same_correction_again_gets_the_report_that_is_in_force() -> None:
+def test_repeated_correction_gets_the_report_in_force() -> None:
     state, _ = folded(session(), config(), decision(1), report(1, False, False), correction(1))
     again = core.step(state, correction(1).model_copy(update={"command_id": "c-9"}), NOW)
     assert (again.state, again.facts, again.repeat) == (state, (), True)
@@ -441,7 +442,7 @@ def test_the_same_correction_again_gets_the_report_that_is_in_force() -> None:
     assert of_kind(back.facts, Performance).cumulative_reward == pytest.approx(-exp(-0.5))
 
 
-def test_nothing_to_correct_is_said() -> None:
+def test_correction_without_a_report_is_refused() -> None:
     state, _ = folded(session(), config(), decision(1))
     with pytest.raises(Conflict, match="decision d1 has no report yet"):
         core.step(state, correction(1), NOW)
@@ -449,8 +450,8 @@ def test_nothing_to_correct_is_said() -> None:
         core.step(state, correction(7), NOW, timed_out=True)
 
 
-def test_only_so_many_reports_are_kept_for_corrections() -> None:
-    state = begun(name="scoring")
+def test_number_of_correctable_reports_is_bounded() -> None:
+    state = configured_session(name="scoring")
     for n in range(1, core.CORRECTABLE + 3):
         state, _ = core.step(state, decision(n), NOW).state, None
         state = core.step(state, report(n), NOW).state
@@ -459,9 +460,9 @@ def test_only_so_many_reports_are_kept_for_corrections() -> None:
     assert core.load(core.dump(state)) == state
 
 
-@pytest.mark.parametrize(("seconds", "told"), [(3600.0, 0), (3600.5, 2), (5000.0, 2)])
-def test_a_duration_above_an_hour_is_told_of(seconds: float, told: int) -> None:
+@pytest.mark.parametrize(("seconds", "count"), [(3600.0, 0), (3600.5, 2), (5000.0, 2)])
+def test_duration_above_an_hour_causes_a_warning(seconds: float, count: int) -> None:
     _, facts = folded(session(), config(), decision(1), report(1, seconds=seconds))
     warnings = of_kind(facts, Performance).warnings
-    assert len(warnings) == told
+    assert len(warnings) == count
     assert all("must be in seconds" in w for w in warnings)

@@ -1,4 +1,4 @@
-"""Which parameters a learner reads is what the study's warnings say it reads."""
+"""The parameters that a learner reads are those that the study's warnings list for it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shift_study.study import Study
 
 
 class Watched(LearnerSettings):
-    """Settings that note which of them are read."""
+    """Settings that record which of them are read."""
 
     def __getattribute__(self, name: str) -> Any:
         if name in LearnerSettings.model_fields and name != "name":
@@ -26,7 +26,7 @@ READ: set[str] = set()
 
 
 @pytest.mark.parametrize("name", LEARNERS)
-def test_a_learner_reads_the_parameters_that_are_said_to_have_an_effect(
+def test_learner_reads_exactly_the_parameters_that_are_listed_for_it(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     READ.clear()

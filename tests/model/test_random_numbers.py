@@ -1,4 +1,4 @@
-"""Addressed randomness: the same bits one by one and all at once, and no pattern in them."""
+"""Counter-based random numbers: scalars and arrays give the same bits, and the bits show no pattern."""
 
 import numpy as np
 from hypothesis import given
@@ -11,7 +11,7 @@ rows = st.lists(st.integers(0, 9), min_size=1, max_size=8).filter(any).map(lambd
 
 
 def naive(seed: int, n: int, stream: int) -> float:
-    """SplitMix64's finalizer as published, three rounds over the address."""
+    """Return the draw by SplitMix64's finalizer as published, three rounds over the address."""
     h = 0
     for word in (seed, n, stream):
         h = ((h ^ word) + 0x9E3779B97F4A7C15) % 2**64
@@ -22,7 +22,7 @@ def naive(seed: int, n: int, stream: int) -> float:
 
 
 @given(seeds, numbers, st.integers(0, 10))
-def test_a_draw_is_the_published_generator_s(seed: int, n: int, stream: int) -> None:
+def test_draw_matches_the_published_generator(seed: int, n: int, stream: int) -> None:
     assert uniform(seed, n, stream) == naive(seed, n, stream)
 
 
@@ -33,7 +33,7 @@ def test_arrays_give_the_same_bits(seed: list[int], n: list[int], stream: int) -
     assert uniform(np.array(seed), n[0], stream).tolist() == [uniform(s, n[0], stream) for s in seed]
 
 
-def test_the_first_draws_of_a_seed_stay_what_they_are() -> None:
+def test_first_draws_of_a_seed_never_change() -> None:
     assert [uniform(7, n) for n in (1, 2, 3)] == [naive(7, n, DECISION) for n in (1, 2, 3)]
     assert DECISION == 0
 
@@ -46,7 +46,7 @@ def test_draws_are_uniform_over_decisions_and_over_seeds() -> None:
         assert ((counts - 1000) ** 2 / 1000).sum() < 150, "chi square, 99 degrees of freedom: 149.4 at p = 0.0008"
 
 
-def test_neighbouring_addresses_have_nothing_to_do_with_each_other() -> None:
+def test_draws_at_neighbouring_addresses_are_uncorrelated() -> None:
     n = np.arange(100_000)
     for a, b in (
         (uniform(np.full(100_000, 7), n), uniform(np.full(100_000, 7), n + 1)),
@@ -57,7 +57,7 @@ def test_neighbouring_addresses_have_nothing_to_do_with_each_other() -> None:
 
 
 @given(rows, st.floats(0, 1, exclude_max=True))
-def test_pick_takes_where_the_running_sum_first_exceeds(row: list[float], u: float) -> None:
+def test_pick_returns_the_index_where_the_running_sum_first_exceeds(row: list[float], u: float) -> None:
     found = pick(row, u)
     assert row[found] > 0
     sums = np.cumsum(row)
@@ -70,11 +70,11 @@ def test_pick_at_the_borders() -> None:
     assert pick([0.5, 0.5], 0.5) == 1
     assert pick([0.5, 0.5], 0.4999) == 0
     assert pick([0.1] * 10, 1 - 2**-53) == 9
-    assert pick([0.1] * 7 + [0.0], 0.99) == 6, "rounding leaves the sum below u: the last with any probability"
+    assert pick([0.1] * 7 + [0.0], 0.99) == 6, "rounding leaves the sum below u: the last index with any probability"
 
 
 @given(rows)
-def test_picked_as_often_as_the_row_says(row: list[float]) -> None:
+def test_pick_frequencies_match_the_row(row: list[float]) -> None:
     drawn = uniform(np.full(4000, 3), np.arange(4000))
     counts = np.bincount([pick(row, u) for u in drawn.tolist()], minlength=len(row))
     assert np.abs(counts / 4000 - row).max() < 0.04

@@ -1,4 +1,4 @@
-"""The reward, against the paper's formula written out."""
+"""The reward, compared with the paper's formula."""
 
 from math import exp
 

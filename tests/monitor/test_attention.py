@@ -11,7 +11,7 @@ from shift_monitor.areas import NOWHERE
 from shift_monitor.attention import Attention, Dwell, apply_dwell, gaze_class, initial_attention, mark_aoi_seen
 from shift_schemas.timestamps import NS
 from shift_study.constants import AttentionSettings
-from support.monitor_sessions import began, fold, last, names, study
+from support.monitor_sessions import configured_session, fold, last, names, study
 
 SETTINGS = AttentionSettings()
 STEP_NS = NS // 10
@@ -149,17 +149,17 @@ def test_study_without_minimum_dwell_has_a_gaze_class_from_the_first_sample() ->
 
 
 def test_aoi_name_stands_until_the_next_name_and_at_most_for_the_maximum() -> None:
-    _, facts = fold(began(), names(0, [0.0, 0.3], ["left", "right"]))
+    _, facts = fold(configured_session(), names(0, [0.0, 0.3], ["left", "right"]))
     assert last(facts).gaze.weights == pytest.approx(
         {"left": 1 / 3 + 0.3, "middle": 1 / 3 - 0.15, "right": 1 / 3 - 0.15}
     )
     slow = study(attention={"weight_step": 0.01})
-    _, facts = fold(began(slow), names(0, [0.0, 60.0], ["left", "right"]))
+    _, facts = fold(configured_session(slow), names(0, [0.0, 60.0], ["left", "right"]))
     assert last(facts).gaze.weights["left"] == pytest.approx(1 / 3 + 0.1)
 
 
 def test_last_name_has_no_dwell_yet() -> None:
-    state, facts = fold(began(), names(0, [0.0], ["left"]))
+    state, facts = fold(configured_session(), names(0, [0.0], ["left"]))
     assert last(facts).gaze.weights["left"] == pytest.approx(1 / 3)
     _, facts = fold(state, names(1, [0.2], ["left"]))
     assert last(facts).gaze.weights["left"] == pytest.approx(1 / 3 + 0.2)

@@ -7,7 +7,7 @@ import random
 import pytest
 from shift_monitor.awareness import HISTORY_LENGTH, History, add_result, awareness_view, correct_result
 from shift_schemas.messages import Performance
-from support.monitor_sessions import began, config, fold, last, performance, study
+from support.monitor_sessions import config, configured_session, fold, last, performance, study
 
 
 @pytest.mark.parametrize(
@@ -20,14 +20,14 @@ from support.monitor_sessions import began, config, fold, last, performance, stu
     ],
 )
 def test_awareness_class_follows_the_last_result(comprehension: bool, enabledness: bool, category: str) -> None:
-    _, facts = fold(began(), performance(1, True, True), performance(2, comprehension, enabledness))
+    _, facts = fold(configured_session(), performance(1, True, True), performance(2, comprehension, enabledness))
     assert last(facts).awareness["grasp"].category == category
     assert last(facts).awareness["grasp"].results == 2
 
 
 def test_task_without_results_is_unknown() -> None:
     assert awareness_view(History(), 1, 0.5).category == "unknown"
-    _, facts = fold(began(), performance(1, True, True, task="pour"))
+    _, facts = fold(configured_session(), performance(1, True, True, task="pour"))
     assert set(last(facts).awareness) == {"pour"}
 
 
@@ -52,7 +52,7 @@ def test_ratios_match_a_loop_over_the_window(window: int, threshold: float) -> N
 def test_longer_window_includes_earlier_results() -> None:
     wider = study(awareness={"window": 3, "threshold": 0.6})
     results = [performance(1, True, True), performance(2, True, False), performance(3, False, False)]
-    _, facts = fold(began(), *results, config(wider, version=2))
+    _, facts = fold(configured_session(), *results, config(wider, version=2))
     view = last(facts).awareness["grasp"]
     assert view.comprehension == pytest.approx(2 / 3)
     assert view.category == "misconception_enabledness"

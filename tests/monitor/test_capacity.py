@@ -7,7 +7,7 @@ import random
 import pytest
 from shift_monitor.capacity import Capacity, apply_strategy
 from shift_study.constants import CapacitySettings
-from support.monitor_sessions import AFFIRMATION, NEGATION, began, decision, fold, last, study
+from support.monitor_sessions import AFFIRMATION, NEGATION, configured_session, decision, fold, last, study
 
 SETTINGS = CapacitySettings()
 STRATEGIES = [
@@ -52,7 +52,8 @@ def test_capacity_follows_the_equation_of_the_paper_over_random_sessions() -> No
 
 def test_observation_follows_the_executed_strategies() -> None:
     _, facts = fold(
-        began(), *(decision(n + 1, s) for n, s in enumerate([NEGATION, AFFIRMATION, NEGATION, AFFIRMATION]))
+        configured_session(),
+        *(decision(n + 1, s) for n, s in enumerate([NEGATION, AFFIRMATION, NEGATION, AFFIRMATION])),
     )
     assert last(facts).capacity.value == pytest.approx(0.4)
     assert last(facts).capacity.category == "low"
@@ -61,5 +62,7 @@ def test_observation_follows_the_executed_strategies() -> None:
 
 def test_costs_come_from_the_study() -> None:
     settings = study(capacity={"other_cost": 0.4, "demanding": ["negation"]})
-    _, facts = fold(began(settings), decision(1, {"negation": "negation_affirmation", "hesitation": "none"}))
+    _, facts = fold(
+        configured_session(settings), decision(1, {"negation": "negation_affirmation", "hesitation": "none"})
+    )
     assert last(facts).capacity.value == pytest.approx(0.6)

@@ -11,7 +11,18 @@ import pytest
 from shift_schemas.timestamps import NS
 from shift_sources.files.samples import Sample
 from shift_study.constants import FixationSettings
-from support.monitor_sessions import RECORDINGS, began, fixations, fold, last, played, points, recording, session, study
+from support.monitor_sessions import (
+    RECORDINGS,
+    configured_session,
+    fixations,
+    fold,
+    last,
+    played,
+    points,
+    recording,
+    session,
+    study,
+)
 
 Plain = tuple[int, float, float, int]
 SETTINGS = FixationSettings()
@@ -99,7 +110,7 @@ def steady(seconds: float, x: float = 0.5, start: float = 0.0) -> tuple[list[flo
 
 def test_steady_gaze_is_one_fixation_with_dwell_from_its_first_sample() -> None:
     t, x = steady(0.5)
-    _, facts = fold(began(), points(0, t, x), session("ending"))
+    _, facts = fold(configured_session(), points(0, t, x), session("ending"))
     (found,) = fixations(facts)
     assert found.start_s == 0.0
     assert found.duration_s == pytest.approx(0.5 - 1 / HZ)
@@ -109,7 +120,7 @@ def test_steady_gaze_is_one_fixation_with_dwell_from_its_first_sample() -> None:
 
 def test_gaze_shorter_than_the_minimum_is_not_a_fixation() -> None:
     t, x = steady(0.05)
-    _, facts = fold(began(), points(0, t, x), session("ending"))
+    _, facts = fold(configured_session(), points(0, t, x), session("ending"))
     assert fixations(facts) == []
     assert last(facts).gaze.weights["middle"] == pytest.approx(1 / 3)
 
@@ -117,7 +128,7 @@ def test_gaze_shorter_than_the_minimum_is_not_a_fixation() -> None:
 def test_saccade_ends_one_fixation_and_begins_the_next() -> None:
     t0, x0 = steady(0.3, 0.2)
     t1, x1 = steady(0.3, 0.8, start=0.3)
-    _, facts = fold(began(), points(0, t0 + t1, x0 + x1), session("ending"))
+    _, facts = fold(configured_session(), points(0, t0 + t1, x0 + x1), session("ending"))
     assert [f.aoi for f in fixations(facts)] == ["left", "right"]
     assert last(facts).gaze.fixations == 2
     assert last(facts).gaze.aoi == "right"
@@ -129,13 +140,13 @@ def test_loss_longer_than_the_gap_ends_a_fixation_and_is_not_dwell(lost_s: float
     n = round(lost_s * HZ)
     lost = [0.3 + i / HZ for i in range(n)]
     t1, x1 = steady(0.3, start=0.3 + n / HZ)
-    _, facts = fold(began(), points(0, t0 + lost + t1, [*x0, *[None] * n, *x1]), session("ending"))
+    _, facts = fold(configured_session(), points(0, t0 + lost + t1, [*x0, *[None] * n, *x1]), session("ending"))
     assert len(fixations(facts)) == count
     assert last(facts).gaze.weights["middle"] == pytest.approx(1 / 3 + 0.6 - 1 / HZ)
 
 
 def test_sample_stands_for_the_maximum_gap_at_most() -> None:
-    _, facts = fold(began(), points(0, [0.0, 0.1, 0.2, 0.3], [0.5] * 4), session("ending"))
+    _, facts = fold(configured_session(), points(0, [0.0, 0.1, 0.2, 0.3], [0.5] * 4), session("ending"))
     assert len(fixations(facts)) == 1
     assert last(facts).gaze.weights["middle"] == pytest.approx(1 / 3 + 3 * 0.075)
 
@@ -143,14 +154,14 @@ def test_sample_stands_for_the_maximum_gap_at_most() -> None:
 def test_pause_without_samples_ends_a_fixation_as_a_loss_does() -> None:
     t0, x0 = steady(0.3)
     t1, x1 = steady(0.3, start=0.6)
-    _, facts = fold(began(), points(0, t0 + t1, x0 + x1), session("ending"))
+    _, facts = fold(configured_session(), points(0, t0 + t1, x0 + x1), session("ending"))
     assert len(fixations(facts)) == 2
 
 
 def test_single_outlier_does_not_end_a_fixation() -> None:
     t, x = steady(0.5)
     x[70] = 0.95
-    _, facts = fold(began(), points(0, t, x), session("ending"))
+    _, facts = fold(configured_session(), points(0, t, x), session("ending"))
     assert len(fixations(facts)) == 1
     assert last(facts).gaze.weights["right"] < 1 / 3
 
@@ -159,7 +170,7 @@ def test_camera_at_30_hz_gives_the_weights_of_a_tracker_at_1000_hz() -> None:
     def gaze(hz: int) -> dict[str, float]:
         t = [i / hz for i in range(round(1.5 * hz))]
         x: list[float | None] = [0.2 if s < 0.6 else 0.5 if s < 1.1 else 0.8 for s in t]
-        _, facts = fold(began(), points(0, t, x), session("ending"))
+        _, facts = fold(configured_session(), points(0, t, x), session("ending"))
         return last(facts).gaze.weights
 
     assert gaze(30) == pytest.approx(gaze(1000), abs=0.05)
@@ -169,14 +180,14 @@ def test_camera_at_30_hz_gives_the_weights_of_a_tracker_at_1000_hz() -> None:
 def test_gaze_beside_every_area_is_on_no_aoi() -> None:
     half = study(aois=[{"name": "left", "rectangle": [0, 0, 0.5, 1]}, {"name": "top", "rectangle": [0.5, 0, 1, 0.2]}])
     t, x = steady(0.5, 0.9)
-    _, facts = fold(began(half), points(0, t, x), session("ending"))
+    _, facts = fold(configured_session(half), points(0, t, x), session("ending"))
     assert last(facts).gaze.category == "uncertain"
     assert last(facts).gaze.weights == {"left": 0.5, "top": 0.5}
     assert [f.aoi for f in fixations(facts)] == [""]
 
 
 def test_memory_of_the_detector_is_bounded_at_any_rate() -> None:
-    state = began(study(fixation={"minimum_duration_s": 100.0, "median_filter_s": 10.0}))
+    state = configured_session(study(fixation={"minimum_duration_s": 100.0, "median_filter_s": 10.0}))
     for seq in range(30):
         t = [(seq * 100 + i) * 1e-6 for i in range(100)]
         state, _ = fold(state, points(seq, t, [0.5] * 100))

@@ -7,7 +7,7 @@ from shift_monitor.core import MonitorState, dump, load, step
 from shift_monitor.gaze_input import gaze_input
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.messages import Gaze, GazeChunk, Observation
-from support.monitor_sessions import NOW, Recorded, began, fixations, fold, last, names, points, session
+from support.monitor_sessions import NOW, Recorded, configured_session, fixations, fold, last, names, points, session
 
 
 def look(seq: int, start_s: float, x: float) -> GazeChunk:
@@ -25,7 +25,7 @@ def gaze(facts: list[object]) -> list[Gaze]:
 
 def test_tracker_that_restarts_its_numbers_continues_and_every_chunk_is_recorded() -> None:
     recorded = Recorded()
-    state, before = fold(began(), *looks(0, 100.0, 0.1, 200), recorded=recorded)
+    state, before = fold(configured_session(), *looks(0, 100.0, 0.1, 200), recorded=recorded)
     _, after = fold(state, *looks(0, 110.0, 0.9, 200), recorded=recorded)
     assert last(before).gaze.aoi == "left"
     assert last(after).gaze.aoi == "right"
@@ -39,7 +39,7 @@ def test_tracker_that_restarts_its_numbers_continues_and_every_chunk_is_recorded
 
 @pytest.mark.parametrize(("before_s", "after_s"), [(3600.0, 0.0), (74701.0, 34.0), (1764000000.0, 1763999999.0)])
 def test_clock_that_goes_back_is_a_restart_while_the_numbers_continue(before_s: float, after_s: float) -> None:
-    state, _ = fold(began(), *looks(0, before_s, 0.1, 20))
+    state, _ = fold(configured_session(), *looks(0, before_s, 0.1, 20))
     _, facts = fold(state, *looks(20, after_s, 0.9, 60))
     assert last(facts).gaze.restarts == 1
     assert last(facts).gaze.aoi == "right"
@@ -48,7 +48,7 @@ def test_clock_that_goes_back_is_a_restart_while_the_numbers_continue(before_s: 
 
 
 def test_single_time_far_in_the_future_is_counted_and_the_next_chunk_is_applied() -> None:
-    state, _ = fold(began(), *looks(0, 10.0, 0.1, 20))
+    state, _ = fold(configured_session(), *looks(0, 10.0, 0.1, 20))
     state, jumped = fold(state, points(20, [1.7e9], [0.5], source="tx300"))
     assert "jumps forward" in gaze(jumped)[0].warnings[0]
     _, facts = fold(state, *looks(21, 11.0, 0.9, 60))
@@ -58,13 +58,13 @@ def test_single_time_far_in_the_future_is_counted_and_the_next_chunk_is_applied(
 
 
 def test_single_wrong_number_does_not_stop_the_source() -> None:
-    state, _ = fold(began(), look(0, 0.0, 0.1), look(2**40, 0.05, 0.1))
+    state, _ = fold(configured_session(), look(0, 0.0, 0.1), look(2**40, 0.05, 0.1))
     _, facts = fold(state, *looks(1, 0.1, 0.9, 60))
     assert (last(facts).gaze.restarts, last(facts).gaze.aoi) == (1, "right")
 
 
 def test_clock_that_jumps_forward_continues_without_dwell_in_between() -> None:
-    state, before = fold(began(), *looks(0, 10.0, 0.1, 20))
+    state, before = fold(configured_session(), *looks(0, 10.0, 0.1, 20))
     _, facts = fold(state, *looks(20, 3611.0, 0.1, 20))
     assert last(facts).gaze.restarts == 0
     dwell_s, before_s = last(facts).gaze.dwell_s, last(before).gaze.dwell_s
@@ -75,14 +75,14 @@ def test_clock_that_jumps_forward_continues_without_dwell_in_between() -> None:
 
 def test_restart_ends_the_open_fixation_in_its_own_segment() -> None:
     recorded = Recorded()
-    state, _ = fold(began(), *looks(0, 100.0, 0.1, 10), recorded=recorded)
+    state, _ = fold(configured_session(), *looks(0, 100.0, 0.1, 10), recorded=recorded)
     _, facts = fold(state, *looks(0, 0.0, 0.9, 10), session("ending"), recorded=recorded)
     assert [(f.segment, f.aoi) for f in fixations(facts)] == [(0, "left"), (1, "right")]
 
 
 def test_same_content_is_a_repeat_at_any_age_and_across_a_restart() -> None:
     recorded = Recorded()
-    state, _ = fold(began(), *looks(0, 0.0, 0.1, 300), *looks(0, 15.0, 0.9, 10), recorded=recorded)
+    state, _ = fold(configured_session(), *looks(0, 0.0, 0.1, 300), *looks(0, 15.0, 0.9, 10), recorded=recorded)
     for chunk in (look(0, 0.0, 0.1), look(299, 14.95, 0.1), look(5, 15.25, 0.9)):
         again = step(state, gaze_input(chunk, recorded), NOW)
         assert (again.state, again.facts, again.repeat) == (state, (), True)
@@ -92,7 +92,7 @@ def test_same_content_is_a_repeat_at_any_age_and_across_a_restart() -> None:
 
 def test_late_chunk_after_a_restart_belongs_to_the_new_segment() -> None:
     recorded = Recorded()
-    state, _ = fold(began(), *looks(0, 0.0, 0.1, 10), recorded=recorded)
+    state, _ = fold(configured_session(), *looks(0, 0.0, 0.1, 10), recorded=recorded)
     state, _ = fold(state, look(0, 10.0, 0.9), look(2, 10.1, 0.9), recorded=recorded)
     _, facts = fold(state, look(1, 10.05, 0.9), recorded=recorded)
     (late,) = gaze(facts)
@@ -100,20 +100,22 @@ def test_late_chunk_after_a_restart_belongs_to_the_new_segment() -> None:
 
 
 def test_numbers_far_below_the_first_one_are_a_restart() -> None:
-    state, _ = fold(began(), *looks(1000, 100.0, 0.1, 20))
+    state, _ = fold(configured_session(), *looks(1000, 100.0, 0.1, 20))
     _, facts = fold(state, *looks(0, 0.0, 0.9, 60))
     assert (last(facts).gaze.restarts, last(facts).gaze.aoi) == (1, "right")
 
 
 def test_sample_at_the_time_of_the_last_one_is_refused() -> None:
-    state, _ = fold(began(), points(0, [1.0, 1.01, 1.02], [0.5] * 3))
+    state, _ = fold(configured_session(), points(0, [1.0, 1.01, 1.02], [0.5] * 3))
     with pytest.raises(MalformedMessage, match=r"t must rise by 1 ns or more; the sample before was at 1\.02 s"):
         step(state, points(1, [1.02, 1.03], [0.5] * 2), NOW)
 
 
 def test_session_of_format_1_accepts_restarts_and_records_no_quality() -> None:
     state = step(None, session().model_copy(update={"format": 1}), NOW).state
-    state, facts = fold(MonitorState(**{**vars_of(began()), "format": state.format}), *looks(0, 5.0, 0.1, 5))
+    state, facts = fold(
+        MonitorState(**{**vars_of(configured_session()), "format": state.format}), *looks(0, 5.0, 0.1, 5)
+    )
     state, facts = fold(state, *looks(5, 0.0, 0.9, 60))
     observation = facts[-1]
     assert isinstance(observation, Observation)
@@ -128,6 +130,6 @@ def vars_of(state: MonitorState) -> dict[str, object]:
 
 def test_source_of_names_can_restart() -> None:
     recorded = Recorded()
-    state, _ = fold(began(), names(0, [0.0, 1.0], ["left", "left"]), recorded=recorded)
+    state, _ = fold(configured_session(), names(0, [0.0, 1.0], ["left", "left"]), recorded=recorded)
     _, facts = fold(state, names(0, [0.5, 1.5], ["right", "right"]), recorded=recorded)
     assert (last(facts).gaze.restarts, last(facts).gaze.aoi) == (1, "right")

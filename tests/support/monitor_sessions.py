@@ -77,7 +77,8 @@ def names(seq: int, t: list[float], aoi: list[str | None], source: str = "ros") 
     return GazeChunk(source=source, seq=seq, t=t, aoi=aoi)
 
 
-def began(of: Study | None = None) -> MonitorState:
+def configured_session(of: Study | None = None) -> MonitorState:
+    """Return the state of a session that has its configuration."""
     return fold(None, session(), config(of or study()))[0]
 
 
@@ -122,4 +123,4 @@ def recording(path: Path) -> list[Sample]:
 
 def played(taken: list[Sample], n: int, of: Study | None = None) -> tuple[MonitorState, list[Fact]]:
     """Fold a session of these samples in chunks of ``n``, from its start to its end."""
-    return fold(began(of), *chunks(taken, n), session("ending"))
+    return fold(configured_session(of), *chunks(taken, n), session("ending"))

@@ -1,8 +1,8 @@
-"""The learner as a service: its core, and the streams that it reads."""
+"""The learner's shell: its core and the owners that it reads. The worker does the rest."""
 
 from __future__ import annotations
 
-from shift_runtime.service.core import Core
+from shift_runtime.service.loop import Core
 from shift_schemas.registry import READS
 
 from shift_learner import core

@@ -1,18 +1,20 @@
 """Processing capacity: the paper's case equation, its costs and its classes (paper, section III-A1, equation C').
 
-Pure. Scalars and numpy arrays give the same bits. The scalar path calls no numpy function.
+Pure. Scalars and numpy arrays give the same bits. The scalar path does not need numpy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-from numpy.typing import NDArray
-
+from shift_model.arrays import is_array
 from shift_model.thresholds import reaches
 from shift_model.vocabulary import CapacityClass
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @overload
@@ -39,7 +41,9 @@ def next_capacity(value: Any, repeated: Any, cost: Any, *, recovery: float, mini
     minimum, maximum
         The floor and the cap (C_min, C_max).
     """
-    if isinstance(value, np.ndarray):
+    if is_array(value):
+        import numpy as np
+
         recovered = np.minimum(value + recovery, maximum)
         return np.where(repeated, recovered, np.maximum(value - cost, minimum))
     return min(value + recovery, maximum) if repeated else max(value - cost, minimum)

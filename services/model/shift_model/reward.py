@@ -1,18 +1,18 @@
 """The reward function (paper, section III-E, equations TP_score and R).
 
-Pure. Scalars and numpy arrays give the same bits. The scalar path calls no numpy function.
+Pure. Scalars and numpy arrays give the same bits. The scalar path does not need numpy.
 """
 
 from __future__ import annotations
 
 from math import exp
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-from numpy.typing import NDArray
+from shift_model.arrays import is_array
 
-_EXP = np.frompyfunc(exp, 1, 1)
-"""``math.exp`` of each element: ``numpy.exp`` can differ from it in the last bit."""
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @overload
@@ -31,8 +31,11 @@ def task_performance(success: Any, duration_s: Any, decay: float) -> Any:
     decay
         k in 1/s.
     """
-    if isinstance(duration_s, np.ndarray):
-        return np.where(success, 1.0, -1.0) * np.asarray(_EXP(-decay * duration_s), np.float64)
+    if is_array(duration_s):
+        import numpy as np
+
+        exp_each = np.frompyfunc(exp, 1, 1)  # numpy.exp can differ from math.exp in the last bit
+        return np.where(success, 1.0, -1.0) * np.asarray(exp_each(-decay * duration_s), np.float64)
     return (1.0 if success else -1.0) * exp(-decay * duration_s)
 
 

@@ -1,17 +1,19 @@
 """The scoring system H_S and its ranking (paper, section III-C, Table I and equation Scaffolding_score).
 
-Pure. Scalars and numpy arrays give the same ranks. The scalar path calls no numpy function.
+Pure. Scalars and numpy arrays give the same ranks. The scalar path does not need numpy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-from numpy.typing import NDArray
-
+from shift_model.arrays import is_array
 from shift_model.thresholds import reaches
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @overload
@@ -30,7 +32,7 @@ def scaffolding_score(entries: Any, weight: float, s_max: float) -> Any:
     s_max
         The largest sum S_max.
     """
-    if isinstance(entries, np.ndarray):
+    if is_array(entries):
         return weight * entries.sum(axis=-1) / s_max
     return weight * sum(entries) / s_max
 
@@ -41,7 +43,9 @@ def level_index(score: float, thresholds: Sequence[float]) -> int: ...
 def level_index(score: NDArray[Any], thresholds: Sequence[float]) -> NDArray[np.int64]: ...
 def level_index(score: Any, thresholds: Sequence[float]) -> Any:
     """Return the index of the level that a score is ranked into: how many of the rising thresholds it reaches."""
-    if isinstance(score, np.ndarray):
+    if is_array(score):
+        import numpy as np
+
         return reaches(score[..., None], np.array(thresholds)).sum(axis=-1)
     return sum(reaches(score, threshold) for threshold in thresholds)
 

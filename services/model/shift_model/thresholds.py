@@ -6,10 +6,11 @@ answers; both may be mixed and broadcast. A scalar costs one addition and one co
 
 from __future__ import annotations
 
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 MARGIN = 1e-9
 """Chosen: a value this close to a threshold equals it. Values are sums of tenths and thirds, and rounding must not

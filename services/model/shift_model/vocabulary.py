@@ -1,7 +1,7 @@
-"""The words on the wire, in their fixed order (INTERFACE.md, "Words on the wire").
+"""The words of the messages, in their fixed order (INTERFACE.md, "Words on the wire").
 
-Order matters: a triple's index is ``15 * capacity + 5 * gaze + awareness``; actions are the product
-of the strategies' levels, the last strategy fastest.
+The order matters: a triple's index is ``15 * capacity + 5 * gaze + awareness``. Actions are every combination of the
+strategies' levels; the last strategy varies first.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ COGNITIVE_STATES: dict[tuple[str, ...], str] = {
 
 
 class Triple(NamedTuple):
-    """One observation as the decider sees it: a point of the paper's 30-state monitoring space."""
+    """One observation as the decider sees it: one of the paper's 30 monitoring states (section III-A)."""
 
     capacity: CapacityClass
     gaze: GazeClass
@@ -39,12 +39,12 @@ class Triple(NamedTuple):
 
     @property
     def number(self) -> int:
-        """0..29: ``15 * capacity + 5 * gaze + awareness``."""
+        """The index, 0..29: ``15 * capacity + 5 * gaze + awareness``."""
         return 15 * CAPACITIES.index(self.capacity) + 5 * GAZES.index(self.gaze) + AWARENESSES.index(self.awareness)
 
     @property
     def name(self) -> str:
-        """As policies on triples name their states: ``high/focused/unknown``."""
+        """The name in policies whose states are triples, such as ``high/focused/unknown``."""
         return "/".join(self)
 
 
@@ -52,9 +52,8 @@ TRIPLES: tuple[Triple, ...] = tuple(Triple(*t) for t in product(CAPACITIES, GAZE
 
 
 def cognitive_state_name(levels: tuple[str, ...]) -> str:
-    """The name of the cognitive state whose action has these levels, one per strategy.
+    """Return the name of the cognitive state whose action has these levels, one per strategy.
 
-    The paper's names for the paper's six; where a study has other strategies, the levels joined
-    with ``+``.
+    The paper's six states have the paper's names. A study with other strategies has the levels joined with ``+``.
     """
     return COGNITIVE_STATES.get(levels, "+".join(levels))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shift_runtime.service.core import Core, Recall
+from shift_runtime.service.loop import Core, Recall
 from shift_schemas.messages import GazeChunk
 from shift_schemas.registry import READS
 
@@ -13,8 +13,8 @@ from shift_monitor.core import MonitorState
 from shift_monitor.gaze_input import gaze_input
 
 
-def add_earlier_gaze(message: Any, recall: Recall) -> Any:
-    """Return a chunk of gaze with the records of its number; return any other message unchanged."""
+def prepared(message: Any, recall: Recall) -> Any:
+    """Return a chunk of gaze together with the fact that was recorded under its number before."""
     return gaze_input(message, recall) if isinstance(message, GazeChunk) else message
 
 
@@ -24,6 +24,6 @@ CORE: Core[MonitorState] = Core(
     dump=core.dump,
     load=core.load,
     reads=READS["monitor"],
-    prepare=add_earlier_gaze,
+    prepare=prepared,
     lookups={"gaze": ("source", "seq")},
 )

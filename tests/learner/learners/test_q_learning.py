@@ -1,4 +1,4 @@
-"""The paper's learner: its row is the exact distribution of its rule, its update Watkins's."""
+"""The paper's learner: its row is the exact distribution of its rule, and its update is that of Watkins."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ updates = st.lists(st.tuples(cells, st.floats(-1, 1), st.none() | st.integers(0,
 
 
 def context(**given: object) -> Context:
-    """What the learner may know, with these settings of its own."""
+    """Return a context with these settings of the learner."""
     return Context(study_of({"study": "x", "learner": given}))
 
 
 def taken(state: int, action: int, n: int = 1) -> Taken:
-    """A decision."""
+    """Return a decision."""
     return Taken(n=n, triple=0, cognitive_state=state, action=action, propensity=0.5)
 
 
 def after(known: Context, *actions: int) -> Memory:
-    """The memory after decisions for these actions."""
+    """Return the memory after decisions for these actions."""
     memory = LEARNER.initial(known)
     for n, action in enumerate(actions, start=1):
         memory = LEARNER.on_decision(known, memory, taken(0, action, n))
@@ -35,23 +35,23 @@ def after(known: Context, *actions: int) -> Memory:
 
 
 def with_values(memory: Memory, state: int, values: list[float]) -> Memory:
-    """The memory with other values in one state."""
+    """Return the memory with other values in one state."""
     table = list(memory.values)
     table[state] = tuple(values)
     return Memory(tuple(table), memory.visits, memory.taken, memory.decisions)
 
 
-def test_the_prior_is_one_on_each_state_s_own_action() -> None:
+def test_prior_is_one_on_the_own_action_of_each_state() -> None:
     table = LEARNER.initial(context()).values
     assert table == tuple(tuple(float(a == s) for a in range(6)) for s in range(6))
 
 
-def test_without_the_prior_all_is_zero() -> None:
+def test_values_without_the_prior_are_zero() -> None:
     assert LEARNER.initial(context(scoring_prior=False)).values == ((0.0,) * 6,) * 6
     assert LEARNER.initial(context(prior_value=0.5)).values[2][2] == 0.5
 
 
-def test_the_first_row_is_an_eighth_each_and_a_quarter_more_on_the_suggested_one() -> None:
+def test_first_row_is_an_eighth_each_and_a_quarter_more_on_the_suggested_action() -> None:
     known = context()
     for state in range(6):
         row = LEARNER.row(known, LEARNER.initial(known), state).probabilities
@@ -67,12 +67,12 @@ def test_epsilon_falls_linearly_to_0_over_the_planned_interactions(decisions: in
     assert LEARNER.epsilon(known, memory) >= 0
 
 
-def test_epsilon_s_length_is_the_study_s() -> None:
+def test_epsilon_falls_over_the_interactions_of_the_study() -> None:
     known = Context(study_of({"study": "x", "interactions": 4, "learner": {"epsilon": 1.0}}))
     assert [LEARNER.epsilon(known, after(known, *[0] * n)) for n in range(6)] == [1.0, 0.75, 0.5, 0.25, 0.0, 0.0]
 
 
-def test_exploring_tries_what_was_never_taken_first() -> None:
+def test_exploration_tries_untaken_actions_first() -> None:
     known = context()
     memory = after(known, 0, 2, 2)
     row = LEARNER.row(known, memory, 0).probabilities
@@ -80,13 +80,13 @@ def test_exploring_tries_what_was_never_taken_first() -> None:
     assert row == pytest.approx([1 - epsilon, epsilon / 4, 0.0, epsilon / 4, epsilon / 4, epsilon / 4], abs=1e-15)
 
 
-def test_never_taken_is_counted_over_the_run_and_not_per_state() -> None:
+def test_untaken_actions_are_counted_over_the_run_and_not_per_state() -> None:
     known = context()
     memory = LEARNER.on_decision(known, LEARNER.initial(known), taken(3, 1))
     assert LEARNER.row(known, memory, 5).probabilities[1] == 0.0
 
 
-def test_once_all_were_taken_exploring_is_uniform_over_all() -> None:
+def test_exploration_is_uniform_once_all_actions_were_taken() -> None:
     known = context()
     epsilon = 0.75 * 0.94
     row = LEARNER.row(known, after(known, 0, 1, 2, 3, 4, 5), 4).probabilities
@@ -114,7 +114,7 @@ def test_every_row_is_a_distribution(actions: list[int], values: list[float], ep
 
 @settings(deadline=None)
 @given(updates, st.floats(0, 1), st.floats(0, 1), st.booleans())
-def test_the_update_is_q_learning_s(history: list, rate: float, discount: float, prior: bool) -> None:  # type: ignore[type-arg]
+def test_update_is_that_of_q_learning(history: list, rate: float, discount: float, prior: bool) -> None:  # type: ignore[type-arg]
     known = context(learning_rate=rate, discount=discount, scoring_prior=prior)
     memory = LEARNER.initial(known)
     table = [[float(prior and a == s) for a in range(6)] for s in range(6)]
@@ -130,14 +130,14 @@ def test_the_update_is_q_learning_s(history: list, rate: float, discount: float,
     assert memory.decisions == 0, "epsilon counts decisions, not rewards"
 
 
-def test_it_waits_for_the_next_state_only_with_a_discount() -> None:
+def test_learner_waits_for_the_next_state_only_with_a_discount() -> None:
     assert not LEARNER.needs_following(context())
     assert LEARNER.needs_following(context(discount=0.01))
 
 
 @settings(deadline=None)
 @given(updates, st.lists(st.integers(0, 5), max_size=8))
-def test_a_memory_survives_plain_json(history: list, actions: list[int]) -> None:  # type: ignore[type-arg]
+def test_memory_survives_plain_json(history: list, actions: list[int]) -> None:  # type: ignore[type-arg]
     known = context(discount=0.5)
     memory = after(known, *actions)
     for (state, action), reward, _ in history:
@@ -145,7 +145,7 @@ def test_a_memory_survives_plain_json(history: list, actions: list[int]) -> None
     assert LEARNER.load(known, json.loads(json.dumps(LEARNER.dump(memory)))) == memory
 
 
-def test_no_function_changes_the_memory_that_it_was_given() -> None:
+def test_functions_do_not_change_the_given_memory() -> None:
     known = context()
     memory = LEARNER.initial(known)
     before = json.dumps(LEARNER.dump(memory))

@@ -1,4 +1,4 @@
-"""Scoring only: the suggestion, always; it counts and learns nothing."""
+"""Scoring only: it always follows the suggestion; it counts visits and learns nothing."""
 
 import json
 
@@ -13,7 +13,7 @@ LEARNER, KNOWN = Scoring(), Context(Study(study="x"))
 
 @settings(deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5), st.floats(-1, 1)), max_size=20))
-def test_whatever_the_rewards_it_suggests_what_the_scoring_system_does(history: list[tuple[int, int, float]]) -> None:
+def test_scoring_follows_the_suggestion_for_any_rewards(history: list[tuple[int, int, float]]) -> None:
     memory = LEARNER.initial(KNOWN)
     visits = [[0] * 6 for _ in range(6)]
     for n, (state, action, reward) in enumerate(history, start=1):
@@ -27,6 +27,6 @@ def test_whatever_the_rewards_it_suggests_what_the_scoring_system_does(history: 
     assert LEARNER.load(KNOWN, json.loads(json.dumps(LEARNER.dump(memory)))) == memory
 
 
-def test_it_neither_explores_nor_waits() -> None:
+def test_scoring_neither_explores_nor_waits() -> None:
     assert LEARNER.epsilon(KNOWN, LEARNER.initial(KNOWN)) is None
     assert not LEARNER.needs_following(KNOWN)

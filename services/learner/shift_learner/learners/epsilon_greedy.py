@@ -6,6 +6,8 @@ An exploring step is uniform over all actions.
 
 from __future__ import annotations
 
+from shift_model.q_learning import decayed_epsilon
+
 from shift_learner.learner import Context, Row
 from shift_learner.learners.tabular import Memory, Tabular, greedy, prior_values
 
@@ -29,4 +31,4 @@ class EpsilonGreedy(Tabular):
     def epsilon(self, context: Context, memory: Memory) -> float:
         """Return epsilon, which falls linearly to 0 over the planned interactions, by the decisions made so far."""
         study = context.study
-        return study.learner.epsilon * max(0.0, 1.0 - memory.decisions / study.interactions)
+        return decayed_epsilon(study.learner.epsilon, memory.decisions, study.interactions)

@@ -12,6 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from shift_model.q_learning import decayed_epsilon, updated_value
+
 from shift_learner.learner import Context, Row, Taken
 
 
@@ -57,10 +59,10 @@ class QLearning:
         settings = context.study.learner
         state, action = taken.cognitive_state, taken.action
         row = list(memory.values[state])
-        target = reward
-        if following is not None:
-            target = reward + settings.discount * max(memory.values[following.cognitive_state])
-        row[action] = row[action] + settings.learning_rate * (target - row[action])
+        best_next = 0.0 if following is None else max(memory.values[following.cognitive_state])
+        row[action] = updated_value(
+            row[action], reward, best_next, learning_rate=settings.learning_rate, discount=settings.discount
+        )
         visits = list(memory.visits[state])
         visits[action] += 1
         return replace(
@@ -87,7 +89,7 @@ class QLearning:
     def epsilon(self, context: Context, memory: Memory) -> float:
         """Return epsilon, which falls linearly to 0 over the planned interactions, by the decisions made so far."""
         study = context.study
-        return study.learner.epsilon * max(0.0, 1.0 - memory.decisions / study.interactions)
+        return decayed_epsilon(study.learner.epsilon, memory.decisions, study.interactions)
 
     def dump(self, memory: Memory) -> Any:
         """Return plain lists."""
