@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from shift_runtime.service.loop import Core
+from shift_runtime.service.core import Core
 from shift_schemas.registry import READS
 
 from shift_learner import core

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shift_runtime.service.loop import Core, Recall
+from shift_runtime.service.core import Core, Recall
 from shift_schemas.messages import GazeChunk
 from shift_schemas.registry import READS
 

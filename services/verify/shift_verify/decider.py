@@ -18,7 +18,7 @@ from shift_schemas.messages import Command, Config, Decide, Decision, Estimate, 
 from shift_verify.decider_before_format_3 import DeciderSearch
 from shift_verify.decider_outputs import DeciderOutputs, is_of_task, override_command
 from shift_verify.difference import Placed, differ, is_missing
-from shift_verify.monitor_learner import Inputs
+from shift_verify.inputs import Inputs
 
 FIRST_FORMAT_OF_FOLD = 3
 """The first format in which the outputs record the order of the inputs, and a decision what it required."""
@@ -156,6 +156,7 @@ class DeciderFold:
         """Derive every output that has seen no more observations than were applied."""
         while not self._stopped and (target := self.outputs.target) is not None:
             seen = target.fact.seen
+            _check_versions(target)
             if seen.observation > self.observed:
                 return
             if seen.observation < self.observed:
@@ -200,6 +201,17 @@ class DeciderFold:
         n = getattr(_required(target), subject)
         if n > most:
             differ(target, f"required.{subject}", n, most, f"it required {subject} {n}, and there were {most}")
+
+
+def _check_versions(target: Placed) -> None:
+    """Raise :class:`Differs` if the ``versions`` of a decision do not repeat what it has ``seen``."""
+    if not isinstance(target.fact, Decision):
+        return
+    for subject in ("observation", "config", "policy"):
+        seen, version = getattr(target.fact.seen, subject), getattr(target.fact.versions, subject)
+        if seen != version:
+            why = f"seen.{subject} is {seen} and versions.{subject} is {version}; they must be equal"
+            differ(target, f"versions.{subject}", version, seen, why)
 
 
 def _required(target: Placed) -> Seen:

@@ -18,7 +18,7 @@ from shift_schemas.messages import Command, Config, Decide, Decision, Estimate, 
 
 from shift_verify.decider_outputs import DeciderOutputs, is_of_task, override_command
 from shift_verify.difference import Differs, Placed, differ, is_missing
-from shift_verify.monitor_learner import Inputs
+from shift_verify.inputs import Inputs
 
 Transition = tuple[DeciderState, Observation | Config]
 """A state, and an input that leads on from it."""

@@ -15,7 +15,7 @@ from shift_schemas.errors import ShiftError
 from shift_schemas.messages import Command, Decision, Estimate, Fact, Override, Policy, SetOverride
 
 from shift_verify.difference import Differs, Placed, compare, differ, is_missing, name_of
-from shift_verify.monitor_learner import Inputs
+from shift_verify.inputs import Inputs
 
 
 class DeciderOutputs:
@@ -74,8 +74,8 @@ class DeciderOutputs:
     def compare_estimates(self, derived: Sequence[Fact], cause: str) -> None:
         """Compare the next outputs with the estimates of one input, and move on. Raises :class:`Differs`."""
         recorded = self.outputs[self.next : self.next + len(derived)]
-        for placed, fact in zip(recorded, derived, strict=False):
-            if placed.fact.subject != fact.subject:
+        for i, (placed, fact) in enumerate(zip(recorded, derived, strict=False)):
+            if _stands_for_later(recorded[i:], derived[i:]):
                 is_missing(fact.subject, placed.sequence, placed.place, cause, fact)
             compare(placed, fact)
         if len(recorded) < len(derived) and (self.inputs.complete or self.following is not None):
@@ -130,6 +130,16 @@ class DeciderOutputs:
                     differ(target, f"seen.{field}", n, None, f"seen.{field} is {n}, and {after} in the next output")
         why = f"it must have been published before {name_of(target.fact.subject, target.sequence)}"
         is_missing("estimate", target.sequence, target.place, why, derived)
+
+
+def _stands_for_later(recorded: Sequence[Placed], derived: Sequence[Fact]) -> bool:
+    """Return whether the first recorded output is one that follows the first derived one, which is then missing."""
+    fact, seen = recorded[0].fact, recorded[0].fact.seen
+    if not isinstance(fact, Estimate):
+        return True
+    if (seen.observation, seen.config) != (derived[0].seen.observation, derived[0].seen.config):
+        return True
+    return fact in derived[1:] and fact not in [placed.fact for placed in recorded[1:]]
 
 
 def override_command(fact: Override) -> SetOverride:

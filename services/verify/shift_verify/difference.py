@@ -1,4 +1,4 @@
-"""How a recorded fact and the fact derived again differ: the first field, and both values. Pure."""
+"""Find how a recorded fact and the derived fact differ: the first field, and both values. Pure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from shift_schemas.registry import OWNER_OF
 from shift_study.loading import study_data, study_from_json
 
 PRECISION = 1e-12
-"""Relative; chosen: ``exp`` and ``atan`` of two machines may differ in a number's last digit, a result may not."""
+"""Relative. Chosen: ``exp`` and ``atan`` of two machines may differ in the last digit of a number, and no more.
+"""
+
+LAST = 2**61
+"""A place after all messages: a difference there comes first only if no message differs."""
 
 
 class Placed(NamedTuple):
@@ -25,10 +29,10 @@ class Placed(NamedTuple):
 
 @dataclass(frozen=True)
 class Difference:
-    """Where a recording is not what its inputs give.
+    """A place where a recording differs from what its inputs give.
 
-    ``subject`` is the message's, or ``checksum``, ``file``, ``metadata`` or ``attachment``; ``field`` is the path
-    within it, empty where the whole is meant. A ``sequence`` of 0 is an unknown one.
+    ``subject`` is that of the message, or ``checksum``, ``file``, ``metadata`` or ``attachment``. ``field`` is the
+    path within it, empty for the whole message. ``sequence`` is 0 if it is not known.
     """
 
     subject: str
@@ -39,12 +43,12 @@ class Difference:
     sentence: str
 
     def as_json(self) -> dict[str, Any]:
-        """For ``--json``."""
+        """Return the difference as ``--json`` prints it."""
         return asdict(self)
 
 
 class Differs(Exception):
-    """A difference, and where in the file. What is ``missing`` goes before all that follows from its absence."""
+    """A difference and its place in the file. A missing message ranks before the differences that follow from it."""
 
     def __init__(self, place: int, difference: Difference, missing: bool = False) -> None:
         super().__init__(difference.sentence)
@@ -54,16 +58,16 @@ class Differs(Exception):
 
     @property
     def rank(self) -> tuple[bool, int]:
-        """The smallest is the first difference. All else follows from a configuration: a wrong one comes first."""
+        """The sort key; the smallest is the first difference. Others follow from a configuration, so that is first."""
         return (not self.missing and self.difference.subject != "config", self.place)
 
 
 class NotRecorded(Exception):
-    """An unfinished recording lacks an input that an output has seen: from there on nothing can be derived."""
+    """An unfinished recording lacks an input that an output has seen, so nothing more can be derived."""
 
 
 def differ(at: Placed, field: str, recorded: Any, derived: Any, why: str = "") -> NoReturn:
-    """Raise that ``field`` of a recorded fact is not what it must be."""
+    """Raise that ``field`` of a recorded fact differs from the derived value."""
     subject = at.fact.subject
     said = why or f"{field or 'it'} is {_said(recorded)} in the recording and {_said(derived)} derived again"
     sentence = f"{name_of(subject, at.sequence)}: {said}"
@@ -79,7 +83,7 @@ def is_missing(subject: str, sequence: int, place: int, why: str, derived: Fact 
 
 
 def name_of(subject: str, sequence: int) -> str:
-    """How a message is called in a sentence: ``decision (decider's message 57)``."""
+    """Return the name of a message in a sentence: ``decision (decider's message 57)``."""
     return f"{subject} ({OWNER_OF[subject]}'s message {sequence})"
 
 
@@ -96,17 +100,17 @@ def compare(recorded: Placed, derived: Fact) -> None:
 
 
 def _plain(fact: Fact) -> dict[str, Any]:
-    """The fact's fields; a configuration's study, one string, as the study that it spells.
+    """Return the fields of the fact; the study of a configuration, which is one string, as the study that it spells.
 
-    Without its warnings: they are advice, and a later version may say them in other words.
-    So a recording of an earlier version, whose studies have fewer fields, is as good as one of today.
+    A study of an earlier version has fewer fields, and the missing ones get their defaults. Warnings are left out:
+    they are advice, and a later version may word them differently.
     """
     data: dict[str, Any] = fact.model_dump(mode="json", exclude={"warnings"})
     return data | {"study": study_data(study_from_json(fact.study))} if isinstance(fact, Config) else data
 
 
 def first_field(one: Any, other: Any, at: str) -> tuple[str, Any, Any] | None:
-    """Path and values of the first difference of two plain values; numbers may differ by ``PRECISION``."""
+    """Return path and values of the first difference of two plain values; numbers may differ by ``PRECISION``."""
     if isinstance(one, dict) and isinstance(other, dict):
         return _first_of({**one, **other}, one, other, at)
     if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
