@@ -41,10 +41,10 @@ def live(name: str, interactions: int = 100) -> tuple[list[float], int]:
         triple, action = int(trace.triple[n, 0]), int(trace.action[n, 0])
         taken = Taken(n + 1, triple, context.suggestions[triple], action, 1.0)
         begin = time.perf_counter()
-        memory = learner.decided(context, memory, taken)
+        memory = learner.on_decision(context, memory, taken)
         for state in range(30):
             learner.row(context, memory, state)
-        memory = learner.rewarded(context, memory, taken, float(trace.reward[n, 0]), None)
+        memory = learner.on_reward(context, memory, taken, float(trace.reward[n, 0]), None)
         for state in range(30):
             learner.row(context, memory, state)
         times.append((time.perf_counter() - begin) * 1e3)

@@ -1,7 +1,7 @@
-"""What a core gives back: the fold ``step(state, message) -> (state, facts)`` in one small type.
+"""The protocol of a core: the fold ``step(state, message, now) -> Step`` and its two outcomes. Pure.
 
-Pure. Cores import this and nothing of the runtime; the runtime's shell decodes, steps, commits and
-publishes. Time is passed in as ``now``.
+Cores import this module and nothing of the runtime. The runtime decodes, steps, commits and publishes. A core reads no
+clock: the time is passed in as ``now``.
 """
 
 from __future__ import annotations
@@ -16,7 +16,10 @@ S = TypeVar("S")
 
 @dataclass(frozen=True)
 class Step(Generic[S]):
-    """The next state, the facts that follow, and a command's answer: one of them or an object."""
+    """The result of one step: the next state, the facts to publish, and the answer to a command.
+
+    The answer is one of the facts or a JSON object.
+    """
 
     state: S
     facts: tuple[Fact, ...] = ()
@@ -25,11 +28,11 @@ class Step(Generic[S]):
     """Whether ``result`` is that of an earlier, equal request."""
 
 
-class NotYet(Exception):
+class InputsMissing(Exception):
     """A command cannot be answered before its owner has read more of its inputs.
 
-    ``owners`` are those it waits for; after ``give_up_s`` the shell asks again with ``late=True``, and
-    the core then answers with what it has or raises what is the case.
+    The runtime waits for the facts of ``owners``. After ``give_up_s`` it steps the command again with
+    ``timed_out=True``; the core then answers with the inputs that it has, or raises an error.
     """
 
     def __init__(self, owners: tuple[str, ...], give_up_s: float) -> None:
@@ -38,18 +41,18 @@ class NotYet(Exception):
         self.give_up_s = give_up_s
 
 
-def covers(seen: Seen, need: Seen) -> bool:
-    """Whether what was ``seen`` is all that is ``need``-ed."""
+def covers(seen: Seen, required: Seen) -> bool:
+    """Return whether ``seen`` includes all that is ``required``."""
     return (
-        seen.decision >= need.decision
-        and seen.performance >= need.performance
-        and seen.config >= need.config
-        and seen.observation >= need.observation
-        and seen.policy >= need.policy
-        and covers_gaze(seen, need)
+        seen.decision >= required.decision
+        and seen.performance >= required.performance
+        and seen.config >= required.config
+        and seen.observation >= required.observation
+        and seen.policy >= required.policy
+        and covers_gaze(seen, required)
     )
 
 
-def covers_gaze(seen: Seen, need: Seen) -> bool:
-    """Whether all chunks of gaze were ``seen`` that are ``need``-ed."""
-    return all(seen.gaze.get(source, -1) >= seq for source, seq in need.gaze.items())
+def covers_gaze(seen: Seen, required: Seen) -> bool:
+    """Return whether ``seen`` includes all chunks of gaze that are ``required``."""
+    return all(seen.gaze.get(source, -1) >= seq for source, seq in required.gaze.items())

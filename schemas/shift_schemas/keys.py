@@ -1,11 +1,11 @@
-"""Keys of the mesh. ``parse_key(build_key(k)) == k`` for every key, and nothing else parses.
+"""Keys of the mesh. ``parse_key(build_key(k)) == k`` for every key, and nothing else parses. Pure.
 
-=================================  =====================================================
-``shift/v1/{session}/{subject}``          a fact, published as a hint by its owner
-``shift/v1/{session}/in/{stream}``        a stream into a service
-``shift/v1/{session}/rpc/{procedure}``    a command
-``shift/v1/@service/{service}/{door}``    a service's own doors: outbox, health, metrics, alive
-=================================  =====================================================
+==========================================  =====================================================================
+``shift/v1/{session}/{subject}``            a fact, published by its owner as a notification
+``shift/v1/{session}/in/{stream}``          a stream into a service
+``shift/v1/{session}/rpc/{procedure}``      a command
+``shift/v1/@service/{service}/{endpoint}``  an endpoint of a service itself: outbox, health, metrics, alive
+==========================================  =====================================================================
 """
 
 from __future__ import annotations
@@ -15,66 +15,18 @@ from functools import lru_cache
 
 from shift_schemas.errors import MalformedMessage, shorten
 from shift_schemas.ids import is_id, not_an_id
+from shift_schemas.registry import OWNER_OF, PROCEDURE_OWNER, SERVICES, STREAMS
 
 ROOT = "shift/v1"
 
-OWNERS: dict[str, tuple[str, ...]] = {
-    "recorder": ("session", "config", "marker"),
-    "monitor": ("gaze", "fixation", "observation"),
-    "decider": ("estimate", "decision", "override"),
-    "learner": ("performance", "transition", "policy"),
-}
-"""Who puts out which facts: each fact has exactly one owner (DESIGN.md, "The loop")."""
-
-SUBJECTS: tuple[str, ...] = (
-    "session", "config", "gaze", "fixation", "observation", "estimate", "decision", "override",
-    "performance", "transition", "policy", "marker",
-)  # fmt: skip
-"""Subjects in INTERFACE.md's order; they are the recording's topics."""
-
-READS: dict[str, dict[str, frozenset[str]]] = {
-    "recorder": dict.fromkeys(OWNERS, frozenset()),
-    "monitor": {
-        "recorder": frozenset({"session", "config"}),
-        "decider": frozenset({"decision"}),
-        "learner": frozenset({"performance"}),
-    },
-    "decider": {
-        "recorder": frozenset({"session", "config"}),
-        "monitor": frozenset({"observation"}),
-        "learner": frozenset({"policy"}),
-    },
-    "learner": {"recorder": frozenset({"session", "config"}), "decider": frozenset({"decision"})},
-}
-"""Whose journals each service reads, and which of their subjects its core steps on (the recorder: it files all)."""
-
-OWNER_OF: dict[str, str] = {subject: owner for owner, subjects in OWNERS.items() for subject in subjects}
-
-PROCEDURES: dict[str, tuple[str, ...]] = {
-    "recorder": ("start_session", "end_session", "configure", "mark"),
-    "monitor": (),
-    "decider": ("decide", "override"),
-    "learner": ("report_performance",),
-}
-PROCEDURE_OWNER: dict[str, str] = {p: owner for owner, ps in PROCEDURES.items() for p in ps}
-STREAMS: dict[str, str] = {"gaze": "monitor"}
-SERVICES: tuple[str, ...] = (
-    "recorder",
-    "monitor",
-    "decider",
-    "learner",
-    "gateway",
-    "ros2_bridge",
-    "simulator",
-)
-DOORS: tuple[str, ...] = ("outbox", "health", "metrics", "alive")
-KEYS = 1024
-"""So many keys are remembered with their texts: each message has one, and a session has some twenty."""
+ENDPOINTS: tuple[str, ...] = ("outbox", "health", "metrics", "alive")
+CACHED_KEYS = 1024
+"""How many keys are cached with their texts. Each message needs one, and a session has about twenty."""
 
 
 @dataclass(frozen=True)
 class FactKey:
-    """Where a fact of one session is published."""
+    """The key under which a fact of one session is published."""
 
     session: str
     subject: str
@@ -82,7 +34,7 @@ class FactKey:
 
 @dataclass(frozen=True)
 class StreamKey:
-    """Where a stream flows into a service."""
+    """The key of a stream into a service."""
 
     session: str
     stream: str
@@ -90,7 +42,7 @@ class StreamKey:
 
 @dataclass(frozen=True)
 class CommandKey:
-    """Where a command is asked for."""
+    """The key under which a command is requested."""
 
     session: str
     procedure: str
@@ -98,44 +50,44 @@ class CommandKey:
 
 @dataclass(frozen=True)
 class ServiceKey:
-    """One of a service's own doors."""
+    """The key of an endpoint of a service itself."""
 
     service: str
-    door: str
+    endpoint: str
 
 
 Key = FactKey | StreamKey | CommandKey | ServiceKey
 
 
-@lru_cache(maxsize=KEYS)
+@lru_cache(maxsize=CACHED_KEYS)
 def build_key(key: Key) -> str:
-    """The key's text. Raises :class:`MalformedMessage` for a session that is no id or an unknown word."""
+    """Return the key's text. Raise :class:`MalformedMessage` for a session that is not an id or for an unknown name."""
     match key:
         case FactKey(session, subject):
-            return f"{ROOT}/{_id(session)}/{_word(subject, OWNER_OF)}"
+            return f"{ROOT}/{_id(session)}/{_known(subject, OWNER_OF)}"
         case StreamKey(session, stream):
-            return f"{ROOT}/{_id(session)}/in/{_word(stream, STREAMS)}"
+            return f"{ROOT}/{_id(session)}/in/{_known(stream, STREAMS)}"
         case CommandKey(session, procedure):
-            return f"{ROOT}/{_id(session)}/rpc/{_word(procedure, PROCEDURE_OWNER)}"
-        case ServiceKey(service, door):
-            return f"{ROOT}/@service/{_word(service, SERVICES)}/{_word(door, DOORS)}"
+            return f"{ROOT}/{_id(session)}/rpc/{_known(procedure, PROCEDURE_OWNER)}"
+        case ServiceKey(service, endpoint):
+            return f"{ROOT}/@service/{_known(service, SERVICES)}/{_known(endpoint, ENDPOINTS)}"
 
 
-@lru_cache(maxsize=KEYS)
+@lru_cache(maxsize=CACHED_KEYS)
 def parse_key(text: str) -> Key:
-    """The key that ``text`` spells. Raises :class:`MalformedMessage` for anything else."""
+    """Return the key that ``text`` spells. Raise :class:`MalformedMessage` for anything else."""
     parts = text.split("/")
     if parts[:2] == ROOT.split("/"):
         match parts[2:]:
-            case ["@service", service, door]:
-                return ServiceKey(_word(service, SERVICES), _word(door, DOORS))
+            case ["@service", service, endpoint]:
+                return ServiceKey(_known(service, SERVICES), _known(endpoint, ENDPOINTS))
             case [session, subject]:
-                return FactKey(_id(session), _word(subject, OWNER_OF))
+                return FactKey(_id(session), _known(subject, OWNER_OF))
             case [session, "in", stream]:
-                return StreamKey(_id(session), _word(stream, STREAMS))
+                return StreamKey(_id(session), _known(stream, STREAMS))
             case [session, "rpc", procedure]:
-                return CommandKey(_id(session), _word(procedure, PROCEDURE_OWNER))
-    raise MalformedMessage(f"{shorten(text)!r} is no key of this mesh")
+                return CommandKey(_id(session), _known(procedure, PROCEDURE_OWNER))
+    raise MalformedMessage(f"{shorten(text)!r} is not a key of this mesh")
 
 
 def _id(text: str) -> str:
@@ -144,7 +96,7 @@ def _id(text: str) -> str:
     return text
 
 
-def _word(text: str, words: dict[str, str] | tuple[str, ...]) -> str:
-    if text not in words:
-        raise MalformedMessage(f"{shorten(text)!r} is none of {', '.join(words)}")
+def _known(text: str, names: dict[str, str] | tuple[str, ...]) -> str:
+    if text not in names:
+        raise MalformedMessage(f"{shorten(text)!r} is not one of {', '.join(names)}")
     return text

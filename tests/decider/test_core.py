@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shift_decider import core
-from shift_decider.core import ANY_TASK, DeciderState, Lacks, decided, lacks
+from shift_decider.core import ANY_TASK, DeciderState, MissingInputs, decide, missing_inputs
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import TRIPLES, Triple
-from shift_schemas.core_protocol import NotYet, Step
+from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import Conflict, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import (
     AwarenessView,
@@ -89,10 +89,12 @@ def folded(*messages: Any) -> DeciderState:
 
 
 def ask(
-    state: DeciderState, task: str = "grasp", late: bool = False, name: str = "d1", **need: Any
+    state: DeciderState, task: str = "grasp", timed_out: bool = False, name: str = "d1", **need: Any
 ) -> Step[DeciderState]:
     """One decision."""
-    return core.step(state, Decide(command_id=name, session="s1", task=task, need=Seen(**need)), NOW, late=late)
+    return core.step(
+        state, Decide(command_id=name, session="s1", task=task, need=Seen(**need)), NOW, timed_out=timed_out
+    )
 
 
 def made(state: DeciderState, **given: Any) -> Decision:
@@ -178,31 +180,31 @@ def test_the_row_is_that_of_the_cognitive_state_or_of_the_triple(triple: Triple)
 def test_it_waits_for_those_whose_news_it_lacks(
     messages: tuple[Any, ...], need: dict[str, Any], owners: tuple[str, ...]
 ) -> None:
-    with pytest.raises(NotYet) as waiting:
+    with pytest.raises(InputsMissing) as waiting:
         ask(folded(*messages), **need)
     assert waiting.value.owners == owners
     assert waiting.value.give_up_s == 2.0
 
 
 def test_before_the_configuration_it_waits_for_the_recorder() -> None:
-    with pytest.raises(NotYet) as waiting:
+    with pytest.raises(InputsMissing) as waiting:
         ask(folded(session()))
     assert waiting.value.owners == ("recorder",)
     with pytest.raises(Unavailable, match="recorder"):
-        ask(folded(session()), late=True)
+        ask(folded(session()), timed_out=True)
 
 
 def test_it_waits_as_long_as_the_study_says() -> None:
-    with pytest.raises(NotYet) as waiting:
+    with pytest.raises(InputsMissing) as waiting:
         ask(folded(session(), config(decider={"wait_s": 30.0})))
     assert waiting.value.give_up_s == 30.0
 
 
 def test_the_second_decision_waits_until_the_first_was_applied_everywhere() -> None:
     after = ask(folded(*READY)).state
-    assert lacks(after, Seen()) == Lacks(config=False, observation=True, policy=True)
+    assert missing_inputs(after, Seen()) == MissingInputs(config=False, observation=True, policy=True)
     current = folded_on(after, observation(2, decision=1), policy(2))
-    assert lacks(current, Seen()) == Lacks(config=False, observation=False, policy=False)
+    assert missing_inputs(current, Seen()) == MissingInputs(config=False, observation=False, policy=False)
     assert made(current, name="d2").n == 2
 
 
@@ -215,19 +217,19 @@ def folded_on(state: DeciderState, *messages: Any) -> DeciderState:
 
 def test_without_a_new_observation_it_goes_on_with_the_old_and_says_stale() -> None:
     state = folded_on(ask(folded(*READY)).state, policy(2))
-    found = made(state, late=True, name="d2")
+    found = made(state, timed_out=True, name="d2")
     assert (found.stale, found.policy_source, found.versions.observation) == (True, "learner", 1)
 
 
 def test_without_a_new_policy_it_goes_on_with_the_last() -> None:
     state = folded_on(ask(folded(*READY)).state, observation(2, decision=1))
-    found = made(state, late=True, name="d2")
+    found = made(state, timed_out=True, name="d2")
     assert (found.stale, found.policy_source, found.versions.policy) == (False, "last_policy", 1)
     assert found.propensity in FIRST_ROW
 
 
 def test_without_any_policy_it_follows_the_scoring_system() -> None:
-    found = made(folded(session(), config(), observation()), late=True)
+    found = made(folded(session(), config(), observation()), timed_out=True)
     assert found.policy_source == "scoring"
     assert found.probabilities == [1, 0, 0, 0, 0, 0]
     assert found.strategy == found.suggested == PLAIN
@@ -236,7 +238,7 @@ def test_without_any_policy_it_follows_the_scoring_system() -> None:
 
 def test_without_any_observation_it_is_unavailable() -> None:
     with pytest.raises(Unavailable, match="monitor"):
-        ask(folded(session(), config(), policy()), late=True)
+        ask(folded(session(), config(), policy()), timed_out=True)
 
 
 def test_a_task_that_the_study_does_not_have_is_unknown_with_those_that_there_are() -> None:
@@ -383,7 +385,7 @@ def test_a_restart_at_any_point_changes_nothing(messages: list[Any], at: int) ->
         results: list[Any] = []
         for state in (living, restarted):
             try:
-                results.append(core.step(state, message, NOW, late=True))
+                results.append(core.step(state, message, NOW, timed_out=True))
             except ShiftError as e:
                 results.append((type(e), e.detail))
         assert results[0] == results[1]
@@ -394,7 +396,7 @@ def test_a_restart_at_any_point_changes_nothing(messages: list[Any], at: int) ->
 def test_the_preview_s_function_is_the_decision_s_and_changes_nothing() -> None:
     state = folded(*READY)
     before = core.dump(state)
-    previewed = decided(state, "grasp", "d1", Seen(), NOW, late=False)
+    previewed = decide(state, "grasp", "d1", Seen(), NOW, timed_out=False)
     assert core.dump(state) == before
     facts: tuple[Fact, ...] = ask(state).facts
     assert facts == (previewed,)

@@ -7,8 +7,7 @@ from typing import get_args
 
 import pytest
 from shift_model import vocabulary
-from shift_schemas.keys import OWNER_OF, PROCEDURE_OWNER
-from shift_schemas.messages import COMMANDS, FACTS
+from shift_schemas.registry import COMMANDS, FACTS, OWNER_OF, PROCEDURE_OWNER
 
 GLOSSARY = Path(__file__).resolve().parents[2] / "docs" / "glossary.md"
 

@@ -13,8 +13,7 @@ from shift_gateway.settings import GatewaySettings
 from shift_runtime.bus.memory import Hub, MemoryBus
 from shift_runtime.bus.protocol import Bus
 from shift_runtime.clock import ManualClock
-from shift_schemas.keys import OWNER_OF
-from shift_schemas.messages import COMMANDS, FACTS
+from shift_schemas.registry import COMMANDS, FACTS, OWNER_OF
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "interface.md").read_text(encoding="utf-8")
 

@@ -14,7 +14,8 @@ import pytest
 import zenoh
 from prometheus_client.parser import text_string_to_metric_families
 from shift_runtime.bus.zenoh_config import zenoh_config
-from shift_schemas.keys import DOORS, PROCEDURE_OWNER, SUBJECTS
+from shift_schemas.keys import ENDPOINTS
+from shift_schemas.registry import PROCEDURE_OWNER, SUBJECTS
 from support.interactions import check_recording, essences, expected, interact
 from support.whole_mesh import LiveMesh
 
@@ -63,7 +64,7 @@ def keys() -> dict[str, tuple[str, ...]]:
         "facts": tuple(f"shift/v1/{SESSION}/{subject}" for subject in SUBJECTS),
         "gaze": (f"shift/v1/{SESSION}/in/gaze",),
         "commands": tuple(f"shift/v1/{SESSION}/rpc/{procedure}" for procedure in PROCEDURE_OWNER),
-        "doors": tuple(f"shift/v1/@service/{s}/{door}" for s in (*SERVICES, "gateway") for door in DOORS),
+        "doors": tuple(f"shift/v1/@service/{s}/{door}" for s in (*SERVICES, "gateway") for door in ENDPOINTS),
         "wild": ("shift/v1/*/decision", "shift/v1/**", "shift/v1/*/in/*", "shift/v1/*/rpc/*", "shift/v1/@service/*/*"),
         "hostile": tuple(f"shift/v1/{h}/{rest}" for h in HOSTILE for rest in ("decision", "in/gaze", "rpc/decide")),
         "none of ours": ("shift/v1", f"shift/v1/{SESSION}", f"shift/v1/{SESSION}/in/sound", "shift/v1/a/b/c/d/e"),

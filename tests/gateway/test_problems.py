@@ -309,7 +309,7 @@ async def test_a_new_gateway_knows_what_the_journals_hold(own_mesh: Mesh) -> Non
 async def test_an_end_waits_for_a_service_that_is_away_and_can_be_asked_again(
     own_mesh: Mesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("shift_recorder.service.END_WAIT_S", 0.1)
+    monkeypatch.setattr("shift_recorder.service.convergence.END_WAIT_S", 0.1)
     session = await own_mesh.session(WAIT)
     await own_mesh.stop("learner")
     assert "learner" in problem(await session.post("end"), 503)["detail"]

@@ -13,7 +13,7 @@ from shift_learner import core
 from shift_learner.core import LearnerState
 from shift_learner.learners import learner_named
 from shift_model.vocabulary import TRIPLES, Triple
-from shift_schemas.core_protocol import NotYet
+from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Conflict, InvalidStudy, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import (
     FORMAT,
@@ -171,32 +171,32 @@ def test_an_override_counts_as_taken_is_learned_from_and_has_no_propensity() -> 
 
 
 def test_without_its_decision_a_report_waits_for_the_decider_and_then_is_unknown() -> None:
-    with pytest.raises(NotYet) as waiting:
+    with pytest.raises(InputsMissing) as waiting:
         core.step(begun(), report(1), NOW)
     assert waiting.value.owners == ("decider",)
     with pytest.raises(UnknownThing, match="no decision d1"):
-        core.step(begun(), report(1), NOW, late=True)
+        core.step(begun(), report(1), NOW, timed_out=True)
 
 
 def test_while_the_learner_cannot_know_it_is_unavailable_and_never_unknown() -> None:
-    with pytest.raises(NotYet):
+    with pytest.raises(InputsMissing):
         core.step(begun(), report(1, decision=1), NOW)
     with pytest.raises(Unavailable, match="decider"):
-        core.step(begun(), report(1, decision=1), NOW, late=True)
+        core.step(begun(), report(1, decision=1), NOW, timed_out=True)
     bare, _ = folded(session())
-    with pytest.raises(NotYet) as waiting:
+    with pytest.raises(InputsMissing) as waiting:
         core.step(bare, report(1), NOW)
     assert waiting.value.owners == ("recorder", "decider")
     with pytest.raises(Unavailable, match="recorder"):
-        core.step(bare, report(1), NOW, late=True)
+        core.step(bare, report(1), NOW, timed_out=True)
 
 
 def test_a_report_waits_for_the_configuration_that_was_answered_before_it() -> None:
     state, _ = folded(session(), config(), decision(1))
-    with pytest.raises(NotYet) as waiting:
+    with pytest.raises(InputsMissing) as waiting:
         core.step(state, report(1, config=2), NOW)
     assert waiting.value.owners == ("recorder",)
-    assert core.step(state, report(1, config=2), NOW, late=True).facts
+    assert core.step(state, report(1, config=2), NOW, timed_out=True).facts
 
 
 def test_nothing_is_taken_without_a_session_or_after_its_end() -> None:
@@ -210,7 +210,7 @@ def test_nothing_is_taken_without_a_session_or_after_its_end() -> None:
 def test_a_decision_is_reported_once() -> None:
     state, _ = folded(session(), config(), decision(1), report(1))
     with pytest.raises(UnknownThing):
-        core.step(state, report(1), NOW, late=True)
+        core.step(state, report(1), NOW, timed_out=True)
     waiting, _ = folded(session(), config(discount=0.5), decision(1), report(1))
     with pytest.raises(Conflict, match="has its performance already"):
         core.step(waiting, report(1), NOW)
@@ -379,9 +379,9 @@ def test_a_restart_at_any_point_changes_nothing(history: list[Any], at: int, dis
 def test_a_refused_command_leaves_the_state_as_it_was(history: list[Any]) -> None:
     state, _ = folded(session(), config(), *messages_of(history))
     before = core.dump(state)
-    for late in (False, True):
-        with pytest.raises((ShiftError, NotYet)):
-            core.step(state, report(999), NOW, late=late)
+    for timed_out in (False, True):
+        with pytest.raises((ShiftError, InputsMissing)):
+            core.step(state, report(999), NOW, timed_out=timed_out)
     assert core.dump(state) == before
 
 
@@ -412,7 +412,7 @@ def test_a_correction_is_learned_from_once_more(name: str) -> None:
     learner, memory = learner_named(name), state.memory
     done = core.step(state, correction(1), NOW)
     known = state.reported["d1"].open
-    naive = learner.rewarded(core.context_of(state.config.study), memory, known.taken, exp(-0.5), None)  # type: ignore[union-attr]
+    naive = learner.on_reward(core.context_of(state.config.study), memory, known.taken, exp(-0.5), None)  # type: ignore[union-attr]
     assert learner.dump(done.state.memory) == learner.dump(naive)
 
 
@@ -446,7 +446,7 @@ def test_nothing_to_correct_is_said() -> None:
     with pytest.raises(Conflict, match="decision d1 has no report yet"):
         core.step(state, correction(1), NOW)
     with pytest.raises(UnknownThing, match="no report of decision d7 that can be corrected; the last 256"):
-        core.step(state, correction(7), NOW, late=True)
+        core.step(state, correction(7), NOW, timed_out=True)
 
 
 def test_only_so_many_reports_are_kept_for_corrections() -> None:

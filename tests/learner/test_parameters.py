@@ -40,6 +40,6 @@ def test_a_learner_reads_the_parameters_that_are_said_to_have_an_effect(
         learner.row(context, memory, one.triple if learner.on_triples else one.cognitive_state)
         learner.epsilon(context, memory)
         learner.needs_following(context)
-        memory = learner.decided(context, memory, one)
-        memory = learner.rewarded(context, memory, one, 0.5, following)
+        memory = learner.on_decision(context, memory, one)
+        memory = learner.on_reward(context, memory, one, 0.5, following)
     assert LEARNER_PARAMETERS[name] == READ

@@ -22,6 +22,12 @@ def test_score_at_a_threshold_reaches_it() -> None:
     assert level_index(0.4, []) == 0
 
 
+def test_level_has_a_margin_at_the_threshold() -> None:
+    assert level_index(0.5 - 1e-12, [0.5]) == 1
+    assert level_index(0.5 - 1e-8, [0.5]) == 0
+    assert level_index(2.5 / 3, [0.5, 5 / 6]) == 2
+
+
 @given(entries, st.floats(0, 2), thresholds)
 def test_arrays_give_the_bits_of_scalars(rows: list[tuple[float, ...]], weight: float, rising: list[float]) -> None:
     scores = [scaffolding_score(row, weight, 3.0) for row in rows]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from shift_cli.gaze_files import Sample, chunks
 from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
 from shift_monitor.gaze_input import gaze_input
-from shift_schemas.core_protocol import NotYet
+from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Conflict, MalformedMessage, Unavailable, UnknownThing
 from shift_schemas.messages import (
     Config,
@@ -213,10 +213,10 @@ def test_message_without_a_session_is_refused() -> None:
 @pytest.mark.parametrize("event", [names(0, [0.0], ["left"]), decision(1), performance(1, True, True)])
 def test_message_before_the_configuration_waits(event: Message) -> None:
     state, _ = fold(None, session())
-    with pytest.raises(NotYet):
+    with pytest.raises(InputsMissing):
         step(state, event, NOW)
     with pytest.raises(Unavailable):
-        step(state, event, NOW, late=True)
+        step(state, event, NOW, timed_out=True)
 
 
 def test_message_of_another_kind_changes_nothing() -> None:

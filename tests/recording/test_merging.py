@@ -14,7 +14,7 @@ from shift_recording.durable_file import StorageFailed
 from shift_recording.mcap.reader import Recording
 from shift_recording.merging import finish_recording
 from shift_schemas.errors import Conflict, UnknownThing
-from shift_schemas.keys import OWNER_OF
+from shift_schemas.registry import OWNER_OF
 from support.recordings import (
     ATTACHMENTS,
     METADATA,

@@ -17,8 +17,8 @@ from shift_runtime.reader import Reader, ReadFact
 from shift_schemas.codec import encode
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, UnknownThing
 from shift_schemas.ids import is_id
-from shift_schemas.keys import OWNERS
 from shift_schemas.messages import OutboxPage
+from shift_schemas.registry import OWNERS
 from shift_schemas.timestamps import NS
 from support.verify_sessions import Session
 

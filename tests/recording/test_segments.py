@@ -16,7 +16,7 @@ from shift_recording.mcap.records import Attachment
 from shift_recording.mcap.writer import MAXIMUM_PAYLOAD, RecordingWriter
 from shift_recording.segments import SegmentWriter, segments_of
 from shift_schemas.errors import MalformedMessage, TooLarge
-from shift_schemas.keys import SUBJECTS
+from shift_schemas.registry import SUBJECTS
 from support.recordings import SCHEMAS, interleaved, write_segment
 
 HERE = Path(__file__).parents[1]

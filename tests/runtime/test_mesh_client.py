@@ -134,6 +134,6 @@ async def test_attempts_that_time_out_while_the_service_waits_still_carry_the_co
     await rig.ready()
     client = MeshClient(rig.bus)
     answer = await client.command(DECIDE.model_copy(update={"task": "after-2"}), wait_s=1.0)
-    assert answer.result["late"] is True
+    assert answer.result["timed_out"] is True
     await until(lambda: rig.outbox() == [(1, "decision d1")])
     await rig.stop()

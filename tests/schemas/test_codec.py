@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from pydantic import BaseModel
 from shift_schemas.codec import decode, encode, encode_answer, encoding_of
 from shift_schemas.errors import MalformedMessage
-from shift_schemas.messages import COMMANDS, FACTS, Answer, Configure, Decide, Decision, GazeChunk, OutboxQuery
+from shift_schemas.messages import Answer, Configure, Decide, Decision, GazeChunk, OutboxQuery
+from shift_schemas.registry import COMMANDS, FACTS
 from support.message_strategies import json_values
 
 KINDS: list[type[BaseModel]] = [*FACTS.values(), *COMMANDS.values(), GazeChunk, OutboxQuery, Answer]

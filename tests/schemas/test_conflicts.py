@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shift_schemas.conflicts import differences, repeat_conflict
 from shift_schemas.messages import (
-    COMMANDS,
     Command,
     Decide,
     EndSession,
@@ -19,6 +18,7 @@ from shift_schemas.messages import (
     SetOverride,
     StartSession,
 )
+from shift_schemas.registry import COMMANDS
 
 
 def refused(before: Command, now: Command) -> str:

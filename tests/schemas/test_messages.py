@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from shift_schemas.core_protocol import covers
 from shift_schemas.messages import (
-    FACTS,
     Configure,
     Decide,
     GazeChunk,
@@ -18,6 +17,7 @@ from shift_schemas.messages import (
     Seen,
     SetOverride,
 )
+from shift_schemas.registry import FACTS
 
 POINTS: dict[str, Any] = {"source": "tx300", "seq": 0, "t": [0.0, 0.1], "x": [0.5, None], "y": [0.5, None]}
 NAMES: dict[str, Any] = {"source": "ros", "seq": 0, "t": [0.0, 0.1], "aoi": ["robot", None]}

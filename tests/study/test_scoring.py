@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shift_model.vocabulary import AWARENESSES, CAPACITIES, COGNITIVE_STATES, GAZES, TRIPLES, Triple
 from shift_study.loading import study_of
-from shift_study.scoring import rank, reduce, suggestions, view
+from shift_study.scoring import reduce, suggestions, view
 from shift_study.study import Study
 
 EO, EM, DM, OS, UF = (
@@ -79,12 +79,6 @@ def test_scores_are_the_weighted_sums_of_the_table_by_hand(triple: Triple, negat
     }
     level = 0 if found.scores["negation"] < 0.5 - 1e-9 else 1 if found.scores["negation"] < 5 / 6 - 1e-9 else 2
     assert found.action == 2 * level + (found.scores["hesitation"] >= 0.5 - 1e-9)
-
-
-def test_a_score_at_a_threshold_reaches_it_whatever_the_rounding() -> None:
-    assert rank(0.5 - 1e-12, [0.5]) == 1
-    assert rank(0.5 - 1e-8, [0.5]) == 0
-    assert rank(2.5 / 3, [0.5, 5 / 6]) == 2
 
 
 def test_triples_are_numbered_15_c_5_g_a() -> None:

@@ -1,7 +1,7 @@
 """``shift-mesh`` whose services die at the worst moment: after a commit, before its reply.
 
 A file ``{data}/die-{service}`` makes the service kill itself, once, when it has committed an answer and
-would tell of it next. Called by test_lost_replies.py in the place of ``python -m shift_cli.main``.
+would reply with it next. Called by test_lost_replies.py in the place of ``python -m shift_cli.main``.
 """
 
 from __future__ import annotations
@@ -13,19 +13,20 @@ from typing import Any
 
 from shift_cli.main import main
 from shift_runtime.service.loop import Worker
+from shift_runtime.service.transaction import Transaction
 
-tell = Worker._tell
+reply = Worker.reply
 
 
-def die_first(self: Worker[Any], turn: Any) -> None:
+def die_first(self: Worker[Any], done: Transaction) -> None:
     wish = Path(os.environ["SHIFT_DATA"]) / f"die-{self.core.name}"
-    if turn.answers and wish.exists():
+    if done.replies and wish.exists():
         wish.unlink()
         os.kill(os.getpid(), signal.SIGKILL)
-    tell(self, turn)
+    reply(self, done)
 
 
-Worker._tell = die_first  # type: ignore[method-assign]
+Worker.reply = die_first  # type: ignore[method-assign]
 
 if __name__ == "__main__":
     main()

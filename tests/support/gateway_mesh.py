@@ -12,6 +12,7 @@ import json
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +24,14 @@ from shift_gateway.settings import GatewaySettings
 from shift_learner.service import CORE as LEARNER
 from shift_monitor.service import CORE as MONITOR
 from shift_recorder.service import CORE as RECORDER
-from shift_recorder.service import RecorderWorker
+from shift_recorder.service import extend as extend_recorder
 from shift_runtime.bus.memory import Hub, MemoryBus
 from shift_runtime.bus.protocol import Bus
 from shift_runtime.clock import ManualClock
 from shift_runtime.journal import Journal
 from shift_runtime.metrics import Metrics
-from shift_runtime.service.loop import Core, Worker
+from shift_runtime.service.core import Core
+from shift_runtime.service.loop import Worker
 from shift_runtime.settings import MeshSettings
 
 CORES: dict[str, Core[Any]] = {core.name: core for core in (RECORDER, MONITOR, DECIDER, LEARNER)}
@@ -71,10 +73,8 @@ class Mesh:
         """Run a service on its journal."""
         bus = MemoryBus(self.hub)
         journal = Journal(self.data / "state" / f"{name}.sqlite", name, CORES[name].lookups)
-        given = (CORES[name], bus, journal, self.clock, Metrics(name))
-        worker: Worker[Any] = Worker(*given)
-        if name == "recorder":
-            worker = RecorderWorker(*given, settings=MeshSettings(data=self.data))
+        extend = partial(extend_recorder, settings=MeshSettings(data=self.data)) if name == "recorder" else None
+        worker: Worker[Any] = Worker(CORES[name], bus, journal, self.clock, Metrics(name), extend)
         self.services[name] = Service(worker, asyncio.create_task(worker.run()), bus, journal)
 
     async def stop(self, name: str) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from mcap.reader import make_reader
 from shift_runtime.rest_client import RestClient
-from shift_schemas.keys import OWNER_OF
+from shift_schemas.registry import OWNER_OF
 from shift_simulator.live import LiveEpisode, drive
 from shift_simulator.session import play
 from shift_simulator.users import paper_user

@@ -12,8 +12,8 @@ from shift_recording.mcap.records import Attachment
 from shift_recording.mcap.schemas import recorded_json, subject_schemas
 from shift_recording.merging import FinishedRecording, finish_recording
 from shift_recording.segments import SegmentWriter
-from shift_schemas.keys import OWNER_OF
 from shift_schemas.messages import Decision, Fact, Gaze, Marker, TripleView, Versions
+from shift_schemas.registry import OWNER_OF
 from shift_schemas.timestamps import Stamp
 from shift_study.study import Study
 

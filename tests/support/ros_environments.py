@@ -24,7 +24,7 @@ REQUIREMENTS: dict[str, tuple[str, ...]] = {
         "structlog>=25", "prometheus-client>=0.22", "uvloop>=0.22",
     ),
 }  # fmt: skip
-PACKAGES = ("schemas", "services/runtime", "services/ros2_bridge")
+PACKAGES = ("schemas", *(f"services/{room}" for room in ("model", "study", "runtime", "sources", "ros2_bridge")))
 """What the bridge needs of this repository, for ``PYTHONPATH`` in another environment."""
 
 

@@ -27,9 +27,9 @@ from shift_recording.mcap.writer import RecordingWriter
 from shift_recording.merging import finish_recording
 from shift_recording.provenance import attachments_of, metadata_of
 from shift_recording.segments import SegmentWriter
-from shift_schemas.core_protocol import NotYet
-from shift_schemas.keys import READS
+from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.messages import (
+    FORMAT,
     Command,
     Configure,
     Decide,
@@ -43,6 +43,7 @@ from shift_schemas.messages import (
     SetOverride,
     StartSession,
 )
+from shift_schemas.registry import READS
 from shift_schemas.timestamps import Stamp
 
 CORES: dict[str, Callable[..., Any]] = {
@@ -53,9 +54,9 @@ SCHEMAS = subject_schemas()
 
 
 class Session:
-    """One session of study ``study``; its random order is ``seed``'s."""
+    """One session of study ``study`` in ``recording_format``; ``seed`` gives its random order."""
 
-    def __init__(self, study: dict[str, Any] | None = None, seed: int = 1) -> None:
+    def __init__(self, study: dict[str, Any] | None = None, seed: int = 1, recording_format: int = FORMAT) -> None:
         self.rng = random.Random(seed)
         self.now_ns = START
         self.states: dict[str, Any] = dict.fromkeys(CORES)
@@ -66,13 +67,16 @@ class Session:
         self.answered = Seen(config=1)
         self.gaze_s = 0.0
         self.chunks = 0
-        self.do("recorder", StartSession(command_id="start", session="s1", participant="P01", seed=7,
-                                         study={"study": "test", "tasks": ["a", "b"], **(study or {})}))  # fmt: skip
+        given = {"study": "test", "tasks": ["a", "b"], **(study or {})}
+        start = StartSession(
+            command_id="start", session="s1", participant="P01", seed=7, study=given, format=recording_format
+        )
+        self.do("recorder", start)
 
-    def do(self, owner: str, message: Fact | Command | GazeChunk, late: bool = False) -> tuple[Fact, ...]:
+    def do(self, owner: str, message: Fact | Command | GazeChunk, timed_out: bool = False) -> tuple[Fact, ...]:
         """Step a core and put out what it gives."""
         self.now_ns += 1_000_000
-        step = CORES[owner](self.states[owner], message, Stamp.of(self.now_ns), late=late)
+        step = CORES[owner](self.states[owner], message, Stamp.of(self.now_ns), timed_out=timed_out)
         self.states[owner] = step.state
         for fact in step.facts:
             self._put(owner, fact)
@@ -125,14 +129,14 @@ class Session:
         self.answered = self.answered.model_copy(update={"gaze": {**self.answered.gaze, source: self.chunks}})
         self.chunks += 1 if self.rng.random() > 0.05 else 3  # some are lost on the way
 
-    def decide(self, n: int, late: bool) -> None:
-        """Ask for decision ``n``; ``late``: do not wait for what it needs."""
+    def decide(self, n: int, timed_out: bool) -> None:
+        """Ask for decision ``n``; ``timed_out``: do not wait for what it needs."""
         command = Decide(command_id=f"d{n}", session="s1", task=self.rng.choice("ab"), need=self.answered)
         while True:
             try:
-                self.do("decider", command, late=late)
+                self.do("decider", command, timed_out=timed_out)
                 break
-            except NotYet:
+            except InputsMissing:
                 self.deliver(1)
         self.answered = self.answered.model_copy(update={"decision": n})
 
@@ -146,7 +150,7 @@ class Session:
             try:
                 self.do("learner", command)
                 break
-            except NotYet:
+            except InputsMissing:
                 self.deliver(1)
         self.answered = self.answered.model_copy(update={"performance": n})
 
@@ -161,7 +165,7 @@ class Session:
         """Choose a task's next strategy."""
         strategy = {"negation": "negation", "hesitation": "none"}
         command = SetOverride(command_id=f"o{n}", session="s1", task="a", strategy=strategy, reason="so")
-        self.do("decider", command, late=True)
+        self.do("decider", command, timed_out=True)
 
     def interactions(self, count: int) -> Session:
         """So many, with all that can happen."""
@@ -176,7 +180,7 @@ class Session:
                 self.change(n)
             if n % 17 == 5:
                 self.do("recorder", Mark(command_id=f"m{n}", session="s1", text="noted"))
-            self.decide(n, late=self.rng.random() < 0.15)
+            self.decide(n, timed_out=self.rng.random() < 0.15)
             self.deliver(self.rng.randrange(6))
             self.report(n)
             self.record(self.rng.randrange(30))

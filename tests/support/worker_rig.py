@@ -14,9 +14,10 @@ from shift_runtime.bus.protocol import Bus, Handle, Incoming, Reply, Request
 from shift_runtime.clock import ManualClock
 from shift_runtime.journal import Batch, Journal
 from shift_runtime.metrics import Metrics
-from shift_runtime.service.loop import Core, Worker
+from shift_runtime.service.core import Core
+from shift_runtime.service.loop import Worker
 from shift_schemas.codec import decode, encode
-from shift_schemas.core_protocol import NotYet, Step
+from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import Problem, Unavailable, UnknownThing
 from shift_schemas.keys import CommandKey, FactKey, ServiceKey, build_key
 from shift_schemas.messages import (
@@ -53,7 +54,7 @@ class Notes:
         return sum(note.startswith("fixation") for note in self.notes)
 
 
-def step(state: Notes | None, message: Any, now: Stamp, late: bool = False) -> Step[Notes]:
+def step(state: Notes | None, message: Any, now: Stamp, timed_out: bool = False) -> Step[Notes]:
     """Notes each fixation and each decision, and puts each note out as an override.
 
     A task ``after-3`` waits for three fixations, ``unknown`` is known after the first, ``breaks`` breaks.
@@ -67,21 +68,21 @@ def step(state: Notes | None, message: Any, now: Stamp, late: bool = False) -> S
             return Step(replace(state, config=message.version))
         case Fixation():
             if not state.config:
-                raise NotYet(("recorder",), WAIT_S)
+                raise InputsMissing(("recorder",), WAIT_S)
             return noted(state, f"fixation {message.start_s:.0f}", f"f{message.start_s:.0f}", now)
         case Decide(task="breaks"):
             raise ZeroDivisionError
         case Decide(task="unknown") if not state.fixations:
             raise UnknownThing("there is no task unknown")
-        case Decide() if message.task.startswith("after-") and not late:
+        case Decide() if message.task.startswith("after-") and not timed_out:
             if state.fixations < int(message.task.removeprefix("after-")):
-                raise NotYet(("monitor",), WAIT_S)
+                raise InputsMissing(("monitor",), WAIT_S)
         case Decide(task="fact"):
             done = noted(state, f"decision {message.command_id}", message.command_id, now)
             return replace(done, result=done.facts[0])
     assert isinstance(message, Decide)
     done = noted(state, f"decision {message.command_id}", message.command_id, now)
-    return replace(done, result={"n": len(done.state.notes), "fixations": state.fixations, "late": late})
+    return replace(done, result={"n": len(done.state.notes), "fixations": state.fixations, "timed_out": timed_out})
 
 
 def noted(state: Notes, note: str, note_id: str, now: Stamp) -> Step[Notes]:
@@ -201,8 +202,7 @@ class Rig:
         """End it without another word, wherever it is; what was not committed is gone."""
         self.running.cancel()
         await asyncio.gather(self.running, return_exceptions=True)
-        for task in self.worker._tasks:
-            task.cancel()
+        self.worker.tasks.cancel()
         await self.own_bus.close()
         self.journal.close()
 
@@ -259,5 +259,5 @@ class Rig:
 
     def config(self) -> int:
         """The version of the configuration that the worker has read, committed or not."""
-        state = self.worker.states.get("s1")
+        state = self.worker.states.loaded("s1")
         return state.config if state else 0

@@ -21,20 +21,29 @@ from support.verify_sessions import Edit, Session, changed, rewritten, without
 SCORING = {"learner": {"name": "scoring"}}
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+FORMATS = [2, 3]
+"""The format before and the format since which the outputs record the order of the decider's inputs."""
+
+
+@pytest.fixture(scope="module", params=FORMATS, ids=lambda n: f"format-{n}")
+def recording(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """100 interactions with gaze, overrides, markers and changes of the configuration."""
-    return Session().interactions(100).ended().finished(tmp_path_factory.mktemp("whole"))
+    session = Session(recording_format=request.param).interactions(100).ended()
+    return session.finished(tmp_path_factory.mktemp("whole"))
 
 
 @pytest.mark.parametrize(
     "study",
-    [{}, {"learner": {"discount": 0.5}}, SCORING, {"awareness": {"window": 4}, "capacity": {"recovery": 0.15}}],
-    ids=["q-learning", "discount", "scoring", "window"],
-)
+    [{}, {"learner": {"discount": 0.5}}, SCORING, {"awareness": {"window": 4}, "capacity": {"recovery": 0.15}},
+     {"tasks": None}],
+    ids=["q-learning", "discount", "scoring", "window", "any task"],
+)  # fmt: skip
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_hundred_interactions_are_derived_again(tmp_path: Path, study: dict[str, Any], seed: int) -> None:
-    session = Session(study, seed).interactions(100).ended()
+@pytest.mark.parametrize("recording_format", FORMATS)
+def test_a_hundred_interactions_are_derived_again(
+    tmp_path: Path, study: dict[str, Any], seed: int, recording_format: int
+) -> None:
+    session = Session(study, seed, recording_format).interactions(100).ended()
     report = verify(session.finished(tmp_path))
     assert report.difference is None
     assert (report.ok, report.complete, report.checksum) == (True, True, "matches")

@@ -1,7 +1,7 @@
 """The messages: facts, the gaze stream, commands and their answers, one file for each owner.
 
-A fact is frozen, names what happened and has exactly one owner. Its ``subject`` is its key's last part
-and the recording's topic. A ``None`` is left out of a recording, whose schemas have no unions.
+A fact is frozen, states what happened, and has exactly one owner. A recording leaves out a field that is ``None``,
+because its schemas have no unions.
 """
 
 from __future__ import annotations
@@ -15,16 +15,20 @@ from shift_schemas.messages.base import (
     GazeOutcome,
     JsonObject,
     Message,
+    RestRoute,
     Seconds,
     Seen,
+    SessionEvent,
     SessionState,
     Strategy,
+    StreamItem,
     Text,
     Warnings,
 )
 from shift_schemas.messages.decider import Decide, Decision, Estimate, Override, SetOverride, TripleView, Versions
 from shift_schemas.messages.learner import (
     Performance,
+    PerformanceBody,
     Policy,
     PolicyRow,
     ReportPerformance,
@@ -43,15 +47,14 @@ from shift_schemas.messages.recorder import (
     EndSession,
     Mark,
     Marker,
+    PatchBody,
     Session,
     StartSession,
 )
 
 __all__ = [
-    "COMMANDS",
     "DEEPEST",
     "END_ID",
-    "FACTS",
     "FORMAT",
     "MOST_WARNINGS",
     "START_ID",
@@ -82,36 +85,27 @@ __all__ = [
     "OutboxQuery",
     "OutboxRow",
     "Override",
+    "PatchBody",
     "Performance",
+    "PerformanceBody",
     "Policy",
     "PolicyRow",
     "ReportPerformance",
+    "RestRoute",
     "Result",
     "ScoredResult",
     "Seconds",
     "Seen",
     "Session",
+    "SessionEvent",
     "SessionState",
     "SetOverride",
     "StartSession",
     "Strategy",
+    "StreamItem",
     "Text",
     "Transition",
     "TripleView",
     "Versions",
     "Warnings",
 ]
-
-FACTS: dict[str, type[Fact]] = {
-    f.subject: f
-    for f in (
-        Session, Config, Gaze, Fixation, Observation, Estimate, Decision, Override,
-        Performance, Transition, Policy, Marker,
-    )
-}  # fmt: skip
-"""Every fact by its subject, in the recording's order of topics."""
-
-
-COMMANDS: dict[str, type[Command]] = {
-    c.procedure: c for c in (StartSession, EndSession, Configure, Mark, Decide, SetOverride, ReportPerformance)
-}

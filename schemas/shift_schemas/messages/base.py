@@ -1,9 +1,14 @@
-"""What every message shares: field types, facts, commands and what was seen."""
+"""The base of all messages: field types, facts, streams, commands, and how far somebody has read.
+
+A message declares on its class who owns it and where it travels. :mod:`shift_schemas.registry` derives every table from
+these declarations: to add a fact or a command, add its class to the file of its owner.
+"""
 
 from __future__ import annotations
 
+import inspect
 from math import isfinite
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -17,6 +22,10 @@ Count = Annotated[int, Field(ge=0, le=2**53)]
 
 
 SessionState = Literal["live", "ending", "ended"]
+
+
+SessionEvent = Literal["input", "end", "finish"]
+"""What a command means for the lifecycle of its session: see :mod:`shift_schemas.lifecycle`."""
 
 
 GazeOutcome = Literal["applied", "late"]
@@ -35,11 +44,11 @@ Warnings = Annotated[list[str], Field(max_length=MOST_WARNINGS)]
 
 
 DEEPEST = 32
-"""Nesting of a plain JSON object within a message; a study has 6."""
+"""The deepest nesting of a plain JSON object within a message; a study has 6 levels."""
 
 
 def _plain(value: dict[str, Any]) -> dict[str, Any]:
-    """Refuse what JSON cannot say back: infinite numbers (``1e999`` is one), half characters, bottomless nesting."""
+    """Refuse what JSON cannot repeat: infinite numbers (``1e999`` is one), lone surrogates, unlimited nesting."""
     level: list[Any] = [value]
     for _ in range(DEEPEST):
         if any(isinstance(v, float) and not isfinite(v) for v in level):
@@ -54,7 +63,7 @@ def _plain(value: dict[str, Any]) -> dict[str, Any]:
 
 
 JsonObject = Annotated[dict[str, Any], AfterValidator(_plain)]
-"""A JSON object as it came, of which only is known that it can be said back."""
+"""Any JSON object that can be written as JSON again."""
 
 
 class Message(BaseModel):
@@ -75,27 +84,99 @@ class Seen(Message):
 
 
 class Fact(Message):
-    """What happened, put out by its one owner."""
+    """An event that happened, published by its one owner."""
 
+    owner: ClassVar[str]
+    """The service that publishes it."""
     subject: ClassVar[str]
+    """The last part of its key, and the recording's topic."""
+    number: ClassVar[str] = ""
+    """The field that counts the facts of this subject in a session, as :class:`Seen` counts them; empty: none."""
+    listed_last: ClassVar[bool] = False
+    """Whether its topic follows the topics of all other owners."""
 
     session: Id = Field(description="The session it belongs to.")
     stamp: Stamp = Field(description="When its owner made it, wall clock; order is by the owner's sequence.")
     seen: Seen = Field(default=Seen(), description="How far its owner had read its inputs.")
 
 
-class Command(Message):
-    """What a door asks of a fact's owner. ``command_id`` names it: a repeat gets the first result."""
+class StreamItem(Message):
+    """One item of a stream into a service; the service numbers repeats by the item's own number."""
 
+    owner: ClassVar[str]
+    """The service that receives the stream."""
+    stream: ClassVar[str]
+    """The last part of its key."""
+
+
+class RestRoute(NamedTuple):
+    """The REST path of a command."""
+
+    method: Literal["POST", "PATCH"]
+    path: str
+    status: int = 201
+    """The HTTP status of a first answer; a repeat is answered with 200."""
+    tag: str = "interaction"
+    """The path's group in the documentation."""
+    name: str = ""
+    """The path's name in the documentation; empty: the procedure's."""
+    media_types: tuple[str, ...] = ("application/json",)
+    """The content types of the body in the documentation; empty: the path needs no body and ignores one."""
+
+
+class Command(Message):
+    """A request to the owner of a fact. ``command_id`` names it: a repeat gets the first result."""
+
+    owner: ClassVar[str]
+    """The service that carries it out."""
     procedure: ClassVar[str]
+    """The last part of its key."""
+    event: ClassVar[SessionEvent] = "input"
+    """What the command means for the lifecycle of its session."""
+    result: ClassVar[type[Fact] | None] = None
+    """The fact that it makes. If the fact has a number, the answer has the same one, and later requests require it."""
+    wait_s: ClassVar[float | None] = 0.0
+    """How long its owner may wait for missing inputs, seconds; None: the study's ``decider.wait_s``."""
+
+    route: ClassVar[RestRoute | None] = None
+    """Its REST path; None: REST has none."""
+    fixed_id: ClassVar[str] = ""
+    """The command id of a command that a session has only once; empty: each one has its own."""
+    id_field: ClassVar[str] = ""
+    """The body's field in which a client may give the command id; empty: it cannot."""
+    id_prefix: ClassVar[str] = "c-"
+    """The beginning of a command id that the client leaves out."""
+    internal: ClassVar[frozenset[str]] = frozenset()
+    """Fields that the body does not have: the services fill them in."""
+    body: ClassVar[type[BaseModel] | None] = None
+    """The model of the body, if it cannot be derived from the fields (:mod:`shift_schemas.requests`)."""
+    beside: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
+    """Fields that do not make it another command."""
 
     command_id: Id
     session: Id
     need: Seen = Field(default=Seen(), description="What the answerer must have seen: read your own writes.")
 
-    beside: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
-    """Fields that do not make it another command."""
-
     def content(self) -> str:
-        """What makes a repeat a repeat: everything but what the door had seen by then."""
+        """Return what a repeat must be equal in: everything but what the sender had read by then."""
         return self.model_dump_json(exclude=set(self.beside))
+
+    @classmethod
+    def body_fields(cls) -> tuple[str, ...]:
+        """Return the names of the fields that the body has from the command, in the order of their declaration."""
+        return tuple(n for n in inspect.get_annotations(cls) if n in cls.model_fields and n not in cls.internal)
+
+    @classmethod
+    def id_in(cls, body: Any) -> str | None:
+        """Return the command id that a body gives; None if a new one is to be made."""
+        return cls.fixed_id or (getattr(body, cls.id_field) if cls.id_field else None)
+
+    @classmethod
+    def fields_in(cls, body: Any) -> dict[str, Any]:
+        """Return the command's own fields as a body gives them."""
+        return {name: getattr(body, name) for name in cls.body_fields() if name not in Command.model_fields}
+
+    @classmethod
+    def answer_in(cls, result: dict[str, Any]) -> dict[str, Any]:
+        """Return the owner's result as REST shows it."""
+        return result

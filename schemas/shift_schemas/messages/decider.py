@@ -6,7 +6,7 @@ from pydantic import Field
 from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass, PolicySource
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, Strategy, Text
+from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Seen, Strategy, Text
 
 
 class TripleView(Message):
@@ -18,8 +18,9 @@ class TripleView(Message):
 
 
 class Estimate(Fact):
-    """Scores and cognitive state for one task, put out when they change."""
+    """Scores and cognitive state for one task, published when they change."""
 
+    owner = "decider"
     subject = "estimate"
 
     task: str = Field(description="The task; '' stands for every task without results.")
@@ -40,7 +41,9 @@ class Versions(Message):
 class Decision(Fact):
     """Which strategy, and why."""
 
+    owner = "decider"
     subject = "decision"
+    number = "n"
 
     decision_id: Id
     task: Id
@@ -61,6 +64,9 @@ class Decision(Fact):
     stale: bool = Field(description="The observation had not seen all that it must have.")
     state: str = Field(description="The row of the policy that was drawn from.")
     seed: Count = Field(description="The session's seed; the draw's generator is seeded by (seed, n).")
+    required: Seen | None = Field(
+        default=None, description="How far the decider had to have read its inputs; left out before format 3."
+    )
     override_id: str = Field(default="", description="The override that it follows; '' is none.")
     reason: str = Field(default="", description="The override's reason.")
 
@@ -68,6 +74,7 @@ class Decision(Fact):
 class Override(Fact):
     """The experimenter chose the strategy of a task's next decision."""
 
+    owner = "decider"
     subject = "override"
 
     override_id: Id
@@ -77,23 +84,35 @@ class Override(Fact):
 
 
 class Decide(Command):
-    """Which strategy now, for this task?"""
+    """Ask for the strategy to use now, and why."""
 
+    owner = "decider"
     procedure = "decide"
+    result = Decision
+    wait_s = None
+    route = RestRoute("POST", "/v1/sessions/{session}/decisions")
+    id_field = "decision_id"
+    id_prefix = "d-"
 
-    task: Id
+    task: Id = Field(description="The task that is to be explained.")
 
 
 class SetOverride(Command):
     """Choose the strategy of the task's next decision."""
 
+    owner = "decider"
     procedure = "override"
+    result = Override
+    wait_s = None
+    route = RestRoute("POST", "/v1/sessions/{session}/override")
+    id_field = "override_id"
+    id_prefix = "o-"
 
     task: Id
-    strategy: Strategy
+    strategy: Strategy = Field(description="One level of each of the study's strategies.")
     reason: Text = ""
 
     def content(self) -> str:
-        """The same levels in another order are the same content."""
+        """Return the content with the levels sorted: another order is not another override."""
         levels = dict(sorted(self.strategy.items()))
         return Command.content(self.model_copy(update={"strategy": levels}))

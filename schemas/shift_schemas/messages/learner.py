@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field
 from shift_model.vocabulary import LearnerName
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, Strategy, Warnings
+from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Strategy, Warnings
 from shift_schemas.messages.decider import Versions
 
 
@@ -28,7 +28,9 @@ class ScoredResult(Result):
 class Performance(Fact):
     """How the task went, and the reward of it."""
 
+    owner = "learner"
     subject = "performance"
+    number = "n"
 
     decision_id: Id
     task: Id
@@ -47,6 +49,7 @@ class Performance(Fact):
 class Transition(Fact):
     """What was learned from: state, action, reward."""
 
+    owner = "learner"
     subject = "transition"
 
     decision_id: Id
@@ -70,7 +73,9 @@ class PolicyRow(Message):
 class Policy(Fact):
     """Action probabilities for each state, for one decision number."""
 
+    owner = "learner"
     subject = "policy"
+    number = "version"
 
     version: Count = Field(ge=1)
     learner: LearnerName
@@ -81,17 +86,35 @@ class Policy(Fact):
     cumulative_reward: float = 0.0
 
 
-class ReportPerformance(Command):
-    """How the task went. ``command_id`` is the decision's id; a correction has an id of its own."""
+class PerformanceBody(Message):
+    """Report how the task went."""
 
+    decision_id: Id = Field(description="The decision that it was done after.")
+    comprehension: Result
+    enabledness: Result
+    corrects: bool = Field(default=False, description="Replace the decision's earlier report; both are recorded.")
+
+
+class ReportPerformance(Command):
+    """Report how the task went.
+
+    ``command_id`` is the decision's id; a correction has an id of its own, and names the decision in ``corrects``.
+    """
+
+    owner = "learner"
     procedure = "report_performance"
+    result = Performance
+    wait_s = 2.0
+    route = RestRoute("POST", "/v1/sessions/{session}/performance")
+    id_field = "decision_id"
+    body = PerformanceBody
 
     comprehension: Result
     enabledness: Result
     corrects: Id | None = Field(default=None, description="The decision whose report this one replaces.")
 
     def content(self) -> str:
-        """A first report's content has no ``corrects``, as before there were corrections."""
+        """Return the content; a first report has no ``corrects``, as in version 0.1."""
         beside = self.beside if self.corrects is not None else {*self.beside, "corrects"}
         return self.model_dump_json(exclude=set(beside))
 
@@ -99,3 +122,19 @@ class ReportPerformance(Command):
     def decision_id(self) -> str:
         """The decision that is reported."""
         return self.corrects or self.command_id
+
+    @classmethod
+    def id_in(cls, body: PerformanceBody) -> str | None:
+        """Return the decision's id; None for a correction, which needs a new one."""
+        return None if body.corrects else body.decision_id
+
+    @classmethod
+    def fields_in(cls, body: PerformanceBody) -> dict[str, Any]:
+        """Return both results, and the decision that a correction is about."""
+        corrects = body.decision_id if body.corrects else None
+        return {"comprehension": body.comprehension, "enabledness": body.enabledness, "corrects": corrects}
+
+    @classmethod
+    def answer_in(cls, result: dict[str, Any]) -> dict[str, Any]:
+        """Return the performance with each dimension's value alone."""
+        return result | {name: result[name]["value"] for name in ("comprehension", "enabledness")}

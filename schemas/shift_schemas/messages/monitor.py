@@ -8,13 +8,14 @@ from pydantic import Field, model_validator
 from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Count, Fact, GazeOutcome, Message, Seconds, Warnings
+from shift_schemas.messages.base import Count, Fact, GazeOutcome, Message, Seconds, StreamItem, Warnings
 from shift_schemas.timestamps import Stamp
 
 
 class Gaze(Fact):
     """A chunk of gaze as it was applied. Columns of equal length; a lost sample is 0, 0, invalid."""
 
+    owner = "monitor"
     subject = "gaze"
 
     source: Id = Field(description="The gaze source.")
@@ -32,6 +33,7 @@ class Gaze(Fact):
 class Fixation(Fact):
     """A finished fixation, on the source's clock."""
 
+    owner = "monitor"
     subject = "fixation"
 
     source: Id = Field(description="The gaze source.")
@@ -84,7 +86,9 @@ class AwarenessView(Message):
 class Observation(Fact):
     """The whole partner model."""
 
+    owner = "monitor"
     subject = "observation"
+    number = "version"
 
     version: Count = Field(ge=1, description="One more with each observation.")
     capacity: CapacityView
@@ -93,8 +97,11 @@ class Observation(Fact):
     warnings: Warnings = Field(default=[], description="Those of the last gaze and of the last result.")
 
 
-class GazeChunk(Message):
+class GazeChunk(StreamItem):
     """A chunk of gaze, points on the stimulus or AOI names, as a source sends it."""
+
+    owner = "monitor"
+    stream = "gaze"
 
     source: Id = Field(description="The gaze source.")
     seq: Count = Field(description="Number of the chunk within its source, from 0.")

@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import Field, RootModel
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, JsonObject, SessionState, Text, Warnings
+from shift_schemas.messages.base import (
+    Command,
+    Count,
+    Fact,
+    JsonObject,
+    RestRoute,
+    SessionEvent,
+    SessionState,
+    Text,
+    Warnings,
+)
 from shift_schemas.timestamps import Stamp
 
-FORMAT = 2
-"""What a session records. 1: no shares of gaze, no warnings, no restarts. A session keeps its first format."""
+FORMAT = 3
+"""The format that a new session records in. A session keeps the format that it began with.
+
+1: no shares of gaze, no warnings, no restarts. 2: an estimate is published only where it changes, and a decision does
+not record what it required. 3: a configuration always publishes its estimates, and a decision records ``required``.
+"""
 
 
 class Session(Fact):
     """A session began, is ending or ended."""
 
+    owner = "recorder"
     subject = "session"
 
     participant: Id = Field(description="Pseudonym of the participant.")
@@ -32,14 +47,16 @@ class Session(Fact):
     replay_of: str = Field(default="", description="Name of the recording that this session replays.")
     software: str = Field(default="", description="Version of shift-mesh.")
     revision: str = Field(default="", description="Git revision of shift-mesh, where known.")
-    format: Count = Field(default=1, description="Which facts and fields the session records; today 2.")
+    format: Count = Field(default=1, description="Which facts and fields the session records; today 3.")
     warnings: Warnings = Field(default=[], description="What was accepted at its start and may not be meant.")
 
 
 class Config(Fact):
     """The study in force, from here on."""
 
+    owner = "recorder"
     subject = "config"
+    number = "version"
 
     version: Count = Field(ge=1, description="1 at the start, one more per change.")
     study: str = Field(description="The study in force as one JSON string.")
@@ -48,26 +65,35 @@ class Config(Fact):
 class Marker(Fact):
     """A note of the experimenter."""
 
+    owner = "recorder"
     subject = "marker"
+    listed_last = True
 
     marker_id: Id = Field(description="Its id.")
     text: Text = Field(description="What was noted.")
 
 
 START_ID, END_ID = "start", "end"
-"""Start and end have no id of their own: a session has one of each, and a repeat gets the first result."""
+"""Start and end have fixed ids: a session has one of each, and a repeat gets the first result."""
 
 
 class StartSession(Command):
-    """Begin a session."""
+    """Begin a session. The same start again gets the first result."""
 
+    owner = "recorder"
     procedure = "start_session"
+    result = Session
+    route = RestRoute("POST", "/v1/sessions", tag="sessions")
+    fixed_id = START_ID
+    id_field = "session"
+    internal = frozenset({"replay_of", "software", "revision", "format", "warnings"})
     beside = frozenset({"need", "command_id", "format", "warnings"})
 
-    participant: Id
-    study: str | JsonObject = Field(default="default", description="A study's id, or the study itself.")
-    seed: Annotated[int, Field(ge=0, lt=2**53)] | None = None
-    condition: Id | None = None
+    participant: Id = Field(description="Pseudonym of the participant.")
+    session: Id = Field(description="Left out: a new id.")
+    study: Id | JsonObject = Field(default="default", description="A study's name, or the study itself.")
+    seed: Annotated[int, Field(ge=0, lt=2**53)] | None = Field(default=None, description="Left out: from the id.")
+    condition: Id | None = Field(default=None, description="Left out: the study's own values.")
     replay_of: str = ""
     software: str = ""
     revision: str = ""
@@ -76,22 +102,48 @@ class StartSession(Command):
 
 
 class EndSession(Command):
-    """End a session: nothing more is taken, the recording is finished."""
+    """End a session; answered once its recording is finished. It needs no body and ignores one."""
 
+    owner = "recorder"
     procedure = "end_session"
+    event: ClassVar[SessionEvent] = "end"
+    wait_s = 10.0
+    route = RestRoute("POST", "/v1/sessions/{session}/end", 200, "sessions", media_types=())
+    fixed_id = END_ID
+
+
+class PatchBody(RootModel[JsonObject]):
+    """Change the study in force: a JSON merge patch (RFC 7386) of it."""
 
 
 class Configure(Command):
-    """Change the study in force by a JSON merge patch."""
+    """Change the study in force by a JSON merge patch (RFC 7386)."""
 
+    owner = "recorder"
     procedure = "configure"
+    result = Config
+    route = RestRoute(
+        "PATCH", "/v1/sessions/{session}/config", 200, "configuration", "patch_config",
+        ("application/merge-patch+json", "application/json"),
+    )  # fmt: skip
+    body = PatchBody
 
     patch: JsonObject
+
+    @classmethod
+    def fields_in(cls, body: Any) -> dict[str, Any]:
+        """Return the whole body as the patch."""
+        return {"patch": body.root}
 
 
 class Mark(Command):
     """Note something in the recording."""
 
+    owner = "recorder"
     procedure = "mark"
+    result = Marker
+    route = RestRoute("POST", "/v1/sessions/{session}/markers")
+    id_field = "marker_id"
+    id_prefix = "m-"
 
     text: Text

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from shift_schemas.keys import SUBJECTS
+from shift_schemas.registry import SUBJECTS
 
 if TYPE_CHECKING:
     from shift_recording.replay import Extent, Pacer, Publish, Replay

@@ -12,6 +12,7 @@ from typing import IO
 
 from rich.console import Console
 from shift_runtime.endpoints import parse_endpoint
+from shift_runtime.journal_schema import check_journals
 from shift_runtime.settings import read_settings
 from shift_schemas.errors import InvalidSettings, shorten
 
@@ -34,6 +35,7 @@ def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str
         parse_endpoint(router, "--router")
     read_settings()
     lock = _lock(data)
+    check_journals(data)
     _check_free(host, port, "--port")
     if router is None:
         _check_free(*endpoint, "--zenoh")

@@ -1,9 +1,9 @@
 """The decider's core: ``step(state, message, now) -> Step``. Pure.
 
-It folds observations, policies and configurations, puts out an estimate where scores or state change,
-and answers ``decide`` and ``override``. A decision needs an observation that has seen all decisions
-before it and what the door had answered, and the policy for its own number; where these do not come
-within ``wait_s`` it is made with what is there, and says so.
+It folds observations, policies and configurations, publishes estimates, and answers ``decide`` and ``override``.
+A decision requires an observation that includes all earlier decisions and everything that the caller was told
+before, and the policy for its own number. If these do not arrive within ``wait_s``, the decision is made with the
+inputs that are there, and says so.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from typing import NamedTuple
 from pydantic import TypeAdapter
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import PolicySource, Triple
-from shift_schemas.core_protocol import NotYet, Step, covers_gaze
-from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.core_protocol import InputsMissing, Step, covers_gaze
+from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.lifecycle import LIVE, check_accepts
 from shift_schemas.messages import (
     Command,
     Config,
@@ -45,67 +46,81 @@ ANY_TASK = ""
 
 @dataclass(frozen=True)
 class DeciderState:
-    """All that the decider knows of one session."""
+    """The decider's state of one session."""
 
     session: str
     seed: int
-    phase: SessionState = "live"
+    phase: SessionState = LIVE
     config: Config | None = None
     observation: Observation | None = None
     policy: Policy | None = None
     n: int = 0
     overrides: dict[str, Override] = field(default_factory=dict)
     estimates: dict[str, tuple[dict[str, float], str]] = field(default_factory=dict)
+    """The scores and the cognitive state that were published last, by task."""
+    format: int = 1
+    """The format that the session records in (``shift_schemas.messages.FORMAT``)."""
+
+    @property
+    def records_inputs(self) -> bool:
+        """Whether the outputs record the order of the inputs and what each decision required: from format 3 on."""
+        return self.format >= 3
 
 
 _STATE = TypeAdapter(DeciderState)
 
 
 def dump(state: DeciderState) -> str:
-    """The state as JSON; :func:`load` takes it back exactly."""
+    """Return the state as JSON. :func:`load` restores it exactly."""
     return _STATE.dump_json(state).decode()
 
 
 def load(text: str) -> DeciderState:
-    """The state that :func:`dump` wrote."""
+    """Return the state that :func:`dump` wrote."""
     return _STATE.validate_json(text)
 
 
-def step(state: DeciderState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[DeciderState]:
+def step(
+    state: DeciderState | None, message: Fact | Command, now: Stamp, timed_out: bool = False
+) -> Step[DeciderState]:
     """Fold one message of a session.
 
     Raises
     ------
-    NotYet
-        A decision must wait for the monitor, the learner or the recorder, and ``late`` is not set.
+    InputsMissing
+        A decision must wait for the monitor, the learner or the recorder, and ``timed_out`` is not set.
     UnknownThing, Conflict, MalformedMessage, Unavailable
         The command cannot be carried out.
     """
     if isinstance(message, Session):
         if state is None:
-            return Step(DeciderState(message.session, message.seed, message.state))
+            return Step(DeciderState(message.session, message.seed, message.state, format=message.format))
         return Step(replace(state, phase=message.state))
     if state is None:
         raise UnknownThing(f"there is no session {message.session}")
     match message:
         case Config():
-            return _estimated(replace(state, config=message), now)
+            return _estimate(replace(state, config=message), now, unchanged=state.records_inputs)
         case Observation():
-            return _estimated(replace(state, observation=message), now)
+            return _estimate(replace(state, observation=message), now)
         case Policy():
             return Step(replace(state, policy=message))
         case Decide():
-            return _decide(state, message, now, late)
+            return _on_decide(state, message, now, timed_out)
         case SetOverride():
-            return _override(state, message, now, late)
+            return _on_override(state, message, now, timed_out)
     return Step(state)
 
 
 # --- estimates ---
 
 
-def _estimated(state: DeciderState, now: Stamp) -> Step[DeciderState]:
-    """Put out an estimate for each task whose scores or cognitive state changed."""
+def _estimate(state: DeciderState, now: Stamp, unchanged: bool = False) -> Step[DeciderState]:
+    """Publish an estimate for each task whose scores or cognitive state changed; if ``unchanged``, for every task.
+
+    A configuration publishes estimates for every task, so that the outputs record when the decider read it:
+    ``seen`` of an estimate then determines the order of configurations and observations.
+    """
     if state.config is None or state.observation is None:
         return Step(state)
     study = study_from_json(state.config.study)
@@ -115,7 +130,7 @@ def _estimated(state: DeciderState, now: Stamp) -> Step[DeciderState]:
     for task in tasks:
         triple = triple_of(state.observation, task)
         found = reductions(state.config.study)[triple]
-        if known.get(task) != (found.scores, found.cognitive_state):
+        if unchanged or known.get(task) != (found.scores, found.cognitive_state):
             known[task] = (found.scores, found.cognitive_state)
             facts.append(
                 Estimate(
@@ -128,7 +143,7 @@ def _estimated(state: DeciderState, now: Stamp) -> Step[DeciderState]:
 
 
 def triple_of(observation: Observation, task: str) -> Triple:
-    """The monitoring state of a task: a task without results is unknown."""
+    """Return the monitoring state of a task. The awareness of a task without results is unknown."""
     results = observation.awareness.get(task)
     return Triple(observation.capacity.category, observation.gaze.category, results.category if results else "unknown")
 
@@ -148,8 +163,8 @@ def _seen(state: DeciderState) -> Seen:
 # --- decisions ---
 
 
-class Lacks(NamedTuple):
-    """Whose news a decision would have to wait for."""
+class MissingInputs(NamedTuple):
+    """Which inputs of a decision have not been read yet."""
 
     config: bool
     observation: bool
@@ -157,47 +172,55 @@ class Lacks(NamedTuple):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """The services that own them."""
-        return tuple(o for o, lacking in zip(("recorder", "monitor", "learner"), self, strict=True) if lacking)
+        """The services that publish them."""
+        return tuple(o for o, missing in zip(("recorder", "monitor", "learner"), self, strict=True) if missing)
 
 
-def lacks(state: DeciderState, need: Seen) -> Lacks:
-    """What is not there yet for the next decision, given what the door had answered."""
+def missing_inputs(state: DeciderState, required: Seen) -> MissingInputs:
+    """Return which inputs of the next decision are missing; ``required`` is what the caller was told before."""
     version = state.config.version if state.config else 0
 
-    def lacking(seen: Seen) -> bool:
+    def is_behind(seen: Seen) -> bool:
         return (
-            seen.decision < max(need.decision, state.n)
-            or seen.config < max(need.config, version)
-            or seen.performance < need.performance
+            seen.decision < max(required.decision, state.n)
+            or seen.config < max(required.config, version)
+            or seen.performance < required.performance
         )
 
     observation, policy = state.observation, state.policy
-    return Lacks(
-        config=version < max(1, need.config),
+    return MissingInputs(
+        config=version < max(1, required.config),
         observation=observation is None
-        or observation.version < need.observation
-        or lacking(observation.seen)
-        or not covers_gaze(observation.seen, need),
-        policy=policy is None or policy.for_n != state.n + 1 or lacking(policy.seen),
+        or observation.version < required.observation
+        or is_behind(observation.seen)
+        or not covers_gaze(observation.seen, required),
+        policy=policy is None or policy.for_n != state.n + 1 or is_behind(policy.seen),
     )
 
 
-def _decide(state: DeciderState, command: Decide, now: Stamp, late: bool) -> Step[DeciderState]:
-    decision = decided(state, command.task, command.command_id, command.need, now, late)
+def _on_decide(state: DeciderState, command: Decide, now: Stamp, timed_out: bool) -> Step[DeciderState]:
+    decision = decide(state, command.task, command.command_id, command.need, now, timed_out)
     overrides = {task: o for task, o in state.overrides.items() if task != command.task}
     after = replace(state, n=decision.n, overrides=overrides)
     return Step(after, (decision,), decision)
 
 
-def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: Stamp, late: bool) -> Decision:
-    """The next decision for ``task``. The gateway's preview is this very function, on its replica."""
-    _check_live(state)
-    missing = lacks(state, need)
-    study = _study(state, missing, late)
+def decide(state: DeciderState, task: str, decision_id: str, required: Seen, now: Stamp, timed_out: bool) -> Decision:
+    """Return the next decision for ``task``. The gateway's preview calls this function on its read model.
+
+    Raises
+    ------
+    InputsMissing
+        An input that is ``required`` is missing, and ``timed_out`` is not set.
+    UnknownThing, Conflict, Unavailable
+        The study has no such task; the session has ended; there is no configuration or observation yet.
+    """
+    check_accepts(state.session, state.phase, Decide)
+    missing = missing_inputs(state, required)
+    study = _study(state, missing, timed_out)
     check_task(study, task)
-    if missing.owners and not late:
-        raise NotYet(missing.owners, study.decider.wait_s)
+    if missing.owners and not timed_out:
+        raise InputsMissing(missing.owners, study.decider.wait_s)
     if state.observation is None or state.config is None:
         raise Unavailable("the monitor has not published an observation of this session yet; ask again")
     triple = triple_of(state.observation, task)
@@ -216,12 +239,13 @@ def decided(state: DeciderState, task: str, decision_id: str, need: Seen, now: S
             policy=state.policy.version if state.policy else 0,
             config=state.config.version,
         ),
+        required=required if state.records_inputs else None,
         override_id=override.override_id if override else "", reason=override.reason if override else "",
     )  # fmt: skip
 
 
 class Choice(NamedTuple):
-    """An action drawn, and why."""
+    """The action of a decision, and how it was chosen."""
 
     action: int
     probabilities: list[float]
@@ -231,7 +255,9 @@ class Choice(NamedTuple):
     state: str
 
 
-def _choose(state: DeciderState, study: Study, task: str, triple: Triple, found: Reduction, missing: Lacks) -> Choice:
+def _choose(
+    state: DeciderState, study: Study, task: str, triple: Triple, found: Reduction, missing: MissingInputs
+) -> Choice:
     actions = study.scoring.actions
     policy = state.policy
     if policy is None:
@@ -253,9 +279,9 @@ def _choose(state: DeciderState, study: Study, task: str, triple: Triple, found:
 # --- overrides ---
 
 
-def _override(state: DeciderState, command: SetOverride, now: Stamp, late: bool) -> Step[DeciderState]:
-    _check_live(state)
-    study = _study(state, lacks(state, command.need), late)
+def _on_override(state: DeciderState, command: SetOverride, now: Stamp, timed_out: bool) -> Step[DeciderState]:
+    check_accepts(state.session, state.phase, command)
+    study = _study(state, missing_inputs(state, command.need), timed_out)
     check_task(study, command.task)
     check_strategy(study, command.strategy)
     fact = Override(
@@ -298,14 +324,9 @@ def check_strategy(study: Study, strategy: Strategy) -> None:
         raise MalformedMessage(f"{errors[0].field}: {errors[0].rule}", tuple(errors))
 
 
-def _check_live(state: DeciderState) -> None:
-    if state.phase != "live":
-        raise Conflict(f"session {state.session} has ended")
-
-
-def _study(state: DeciderState, missing: Lacks, late: bool) -> Study:
-    if missing.config and not late:
-        raise NotYet(("recorder",), study_from_json(state.config.study).decider.wait_s if state.config else 2.0)
+def _study(state: DeciderState, missing: MissingInputs, timed_out: bool) -> Study:
+    if missing.config and not timed_out:
+        raise InputsMissing(("recorder",), study_from_json(state.config.study).decider.wait_s if state.config else 2.0)
     if state.config is None:
         raise Unavailable("the recorder has not published a configuration of this session yet; ask again")
     return study_from_json(state.config.study)

@@ -1,9 +1,9 @@
-"""The decider's shell: what it takes in, by whom. The worker does the rest."""
+"""The decider's shell: its core and the owners that it reads. The worker does the rest."""
 
 from __future__ import annotations
 
-from shift_runtime.service.loop import Core
-from shift_schemas.keys import READS
+from shift_runtime.service.core import Core
+from shift_schemas.registry import READS
 
 from shift_decider import core
 from shift_decider.core import DeciderState

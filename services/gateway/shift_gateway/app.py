@@ -17,12 +17,13 @@ from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
 from shift_schemas.codec import encode
 from shift_schemas.errors import ShiftError, UnknownThing, check_id
-from shift_schemas.keys import OWNERS, ServiceKey, build_key
+from shift_schemas.keys import ServiceKey, build_key
 from shift_schemas.messages import Fact, GazeChunk, Health
+from shift_schemas.registry import OWNERS
 
 from shift_gateway import bodies
 from shift_gateway.docs_page import add_docs
-from shift_gateway.gateway_api import Door
+from shift_gateway.gateway_api import GatewayApi
 from shift_gateway.merged_metrics import gathered
 from shift_gateway.origins import Rules
 from shift_gateway.page import PAGE, PAGE_POLICY
@@ -39,7 +40,7 @@ from shift_gateway.problems import (
 )
 from shift_gateway.readiness import readiness
 from shift_gateway.recordings import list_recordings, recording_path
-from shift_gateway.session_views import Replica
+from shift_gateway.session_views import ReadModel
 from shift_gateway.settings import GatewaySettings
 from shift_gateway.studies import add_studies
 
@@ -54,8 +55,8 @@ Opener = Callable[[], Awaitable[Bus]]
 class Gateway:
     """What the paths share while the application is up."""
 
-    door: Door
-    replica: Replica
+    api: GatewayApi
+    read_model: ReadModel
     mesh: MeshClient
 
     def __init__(self, settings: GatewaySettings) -> None:
@@ -71,13 +72,13 @@ class Gateway:
     async def on(self, bus: Bus, clock: Clock) -> AsyncIterator[None]:
         """Open the replica and the door on a bus, until left."""
         self.mesh = MeshClient(bus, self.settings.patience_s)
-        self.replica = Replica(bus, self.metrics.dropped, self.metrics.link_lost)
-        self.door = Door(self.mesh, self.replica, clock)
+        self.read_model = ReadModel(bus, self.metrics.dropped, self.metrics.link_lost)
+        self.api = GatewayApi(self.mesh, self.read_model, clock)
         bus.serve(build_key(ServiceKey("gateway", "health")), lambda r: r.reply(encode(self.health())))
         bus.serve(build_key(ServiceKey("gateway", "metrics")), lambda r: r.reply(self.metrics_text()))
         bus.token(build_key(ServiceKey("gateway", "alive")))
-        self.replica.reader.start()
-        pulling = asyncio.create_task(self.replica.reader.run())
+        self.read_model.reader.start()
+        pulling = asyncio.create_task(self.read_model.reader.run())
         try:
             yield
         finally:
@@ -87,18 +88,18 @@ class Gateway:
     def metrics_text(self) -> bytes:
         """The gateway's own metrics."""
         for owner in OWNERS:
-            self.metrics.silent(owner, self.replica.reader.links.silent_s(owner))
+            self.metrics.silent(owner, self.read_model.reader.links.silent_s(owner))
         return self.metrics.text()
 
     def health(self) -> Health:
         """The gateway's own."""
-        missing = self.replica.missing
-        unreached = self.replica.reader.links.unreached
+        missing = self.read_model.missing
+        unreached = self.read_model.reader.links.unreached
         detail = f"waits for the {', the '.join(missing)}" if missing else ""
         if not detail and unreached:
             detail = f"the gateway does not reach the {', the '.join(unreached)}"
         return Health(
-            service="gateway", ready=not detail, detail=detail, sessions=len(self.replica.views), unreached=unreached
+            service="gateway", ready=not detail, detail=detail, sessions=len(self.read_model.views), unreached=unreached
         )
 
 
@@ -165,35 +166,35 @@ def _add_sessions(app: FastAPI, gateway: Gateway) -> None:
     @app.post("/v1/sessions", status_code=201, tags=["sessions"], openapi_extra=_documented(bodies.StartBody))
     async def start_session(request: Request) -> Response:
         """Begin a session. The same start again gets the first result."""
-        return _created(await gateway.door.start(await body(request, bodies.StartBody)))
+        return _created(await gateway.api.start(await body(request, bodies.StartBody)))
 
     @app.get("/v1/sessions", tags=["sessions"])
     async def list_sessions() -> dict[str, Any]:
         """Every session."""
-        return {"sessions": await gateway.door.sessions()}
+        return {"sessions": await gateway.api.sessions()}
 
     @app.get("/v1/sessions/{session}", tags=["sessions"])
     async def get_session(session: str) -> dict[str, Any]:
         """One session, with counts so far."""
-        return await gateway.door.session(check_id("session", session))
+        return await gateway.api.session(check_id("session", session))
 
     @app.post("/v1/sessions/{session}/end", tags=["sessions"])
     async def end_session(session: str, request: Request) -> dict[str, Any]:
         """End a session; answered once its recording is finished. It needs no body and takes no notice of one."""
-        await gateway.replica.view(check_id("session", session))
+        await gateway.read_model.view(check_id("session", session))
         await request.body()
-        return await gateway.door.end(session)
+        return await gateway.api.end(session)
 
     @app.get("/v1/sessions/{session}/config", tags=["configuration"])
     async def get_config(session: str) -> dict[str, Any]:
         """The study in force."""
-        return await gateway.door.config(check_id("session", session))
+        return await gateway.api.config(check_id("session", session))
 
     @app.patch("/v1/sessions/{session}/config", tags=["configuration"], openapi_extra=_PATCH)
     async def patch_config(session: str, request: Request) -> dict[str, Any]:
         """Change the study in force by a JSON merge patch (RFC 7386)."""
-        await gateway.replica.view(check_id("session", session))
-        return await gateway.door.configure(session, (await body(request, bodies.PatchBody)).root)
+        await gateway.read_model.view(check_id("session", session))
+        return await gateway.api.configure(session, (await body(request, bodies.PatchBody)).root)
 
 
 _PATCH = {
@@ -210,8 +211,8 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
     )
     async def post_gaze(session: str, request: Request) -> dict[str, Any]:
         """A chunk of gaze, points or AOI names."""
-        await gateway.replica.view(check_id("session", session))
-        return await gateway.door.gaze(session, await body(request, GazeChunk))
+        await gateway.read_model.view(check_id("session", session))
+        return await gateway.api.gaze(session, await body(request, GazeChunk))
 
     @app.websocket("/v1/sessions/{session}/gaze")
     async def stream_gaze(socket: WebSocket, session: str) -> None:
@@ -234,9 +235,9 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
     )
     async def decide(session: str, request: Request) -> Response:
         """The strategy to use now, and why."""
-        await gateway.replica.view(check_id("session", session))
+        await gateway.read_model.view(check_id("session", session))
         asked = await body(request, bodies.DecisionBody)
-        return _created(await gateway.door.decide(session, asked.task, asked.decision_id))
+        return _created(await gateway.api.decide(session, asked.task, asked.decision_id))
 
     @app.post(
         "/v1/sessions/{session}/performance",
@@ -246,8 +247,8 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
     )
     async def report_performance(session: str, request: Request) -> Response:
         """How the task went."""
-        await gateway.replica.view(check_id("session", session))
-        return _created(await gateway.door.report(session, await body(request, bodies.PerformanceBody)))
+        await gateway.read_model.view(check_id("session", session))
+        return _created(await gateway.api.report(session, await body(request, bodies.PerformanceBody)))
 
     @app.post(
         "/v1/sessions/{session}/override",
@@ -257,8 +258,8 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
     )
     async def override(session: str, request: Request) -> Response:
         """Choose the strategy of the task's next decision."""
-        await gateway.replica.view(check_id("session", session))
-        return _created(await gateway.door.override(session, await body(request, bodies.OverrideBody)))
+        await gateway.read_model.view(check_id("session", session))
+        return _created(await gateway.api.override(session, await body(request, bodies.OverrideBody)))
 
     @app.post(
         "/v1/sessions/{session}/markers",
@@ -268,17 +269,17 @@ def _add_interaction(app: FastAPI, gateway: Gateway) -> None:
     )
     async def mark(session: str, request: Request) -> Response:
         """Note something in the recording."""
-        await gateway.replica.view(check_id("session", session))
-        return _created(await gateway.door.mark(session, await body(request, bodies.MarkerBody)))
+        await gateway.read_model.view(check_id("session", session))
+        return _created(await gateway.api.mark(session, await body(request, bodies.MarkerBody)))
 
 
 async def _take_chunk(gateway: Gateway, session: str, raw: str | bytes) -> dict[str, Any]:
     try:
         check_id("session", session)
-        await gateway.replica.view(session)
+        await gateway.read_model.view(session)
         check_size(len(raw))
         chunk = message(raw, GazeChunk)
-        return {**await gateway.door.gaze(session, chunk), "seq": chunk.seq}
+        return {**await gateway.api.gaze(session, chunk), "seq": chunk.seq}
     except ShiftError as e:
         return problem_body(e)
 
@@ -287,12 +288,12 @@ def _add_reads(app: FastAPI, gateway: Gateway) -> None:
     @app.get("/v1/sessions/{session}/observation", tags=["reading"])
     async def get_observation(session: str) -> dict[str, Any]:
         """The partner model."""
-        return await gateway.door.observation(check_id("session", session))
+        return await gateway.api.observation(check_id("session", session))
 
     @app.get("/v1/sessions/{session}/policy", tags=["reading"])
     async def get_policy(session: str) -> dict[str, Any]:
         """The policy for the next decision."""
-        return await gateway.door.policy(check_id("session", session))
+        return await gateway.api.policy(check_id("session", session))
 
     @app.get("/v1/sessions/{session}/strategy", tags=["reading"])
     async def preview(
@@ -301,12 +302,12 @@ def _add_reads(app: FastAPI, gateway: Gateway) -> None:
     ) -> dict[str, Any]:
         """What a decision made now would carry; no side effect."""
         check_id("session", session)
-        return await gateway.door.preview(session, check_id("task", only("task", task)))
+        return await gateway.api.preview(session, check_id("task", only("task", task)))
 
     @app.get("/v1/sessions/{session}/events", tags=["reading"], response_class=StreamingResponse)
     async def events(session: str, request: Request) -> Response:
         """Server-sent events: event = subject, data = the message."""
-        view = await gateway.replica.view(check_id("session", session))
+        view = await gateway.read_model.view(check_id("session", session))
         waiting: asyncio.Queue[str | None] = asyncio.Queue(EVENTS_WAITING)
 
         def listen(fact: Fact, payload: str) -> None:
@@ -343,7 +344,7 @@ def _add_recordings(app: FastAPI, gateway: Gateway) -> None:
     @app.get("/v1/recordings", tags=["recordings"])
     async def recordings() -> dict[str, Any]:
         """The recordings that are there."""
-        sessions = {s["session"]: s for s in await gateway.door.sessions()}
+        sessions = {s["session"]: s for s in await gateway.api.sessions()}
         return {"recordings": list_recordings(gateway.recordings, sessions)}
 
     @app.get("/v1/recordings/{name}", tags=["recordings"], response_class=FileResponse)

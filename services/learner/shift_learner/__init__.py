@@ -1,1 +1,1 @@
-"""The learner: reward, update, and the policy as action probabilities for each state."""
+"""The learner: it computes rewards, learns from them, and publishes a policy: action probabilities for each state."""

@@ -6,7 +6,7 @@ from shift_learner.service import CORE
 
 
 def main() -> None:
-    """Run it."""
+    """Run the learner until it is stopped."""
     run_service(CORE)
 
 

@@ -15,8 +15,9 @@ from typing import Any
 from pydantic import TypeAdapter
 from shift_model.reward import reward, task_performance
 from shift_model.vocabulary import Triple
-from shift_schemas.core_protocol import NotYet, Step
+from shift_schemas.core_protocol import InputsMissing, Step
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
+from shift_schemas.lifecycle import LIVE, check_accepts, is_ending
 from shift_schemas.messages import (
     Command,
     Config,
@@ -73,7 +74,7 @@ class LearnerState:
     """All that the learner knows of one session. ``memory`` is the learner's own, as plain JSON on disk."""
 
     session: str
-    phase: SessionState = "live"
+    phase: SessionState = LIVE
     config: Config | None = None
     memory: Any = None
     open: dict[str, Open] = field(default_factory=dict)
@@ -114,13 +115,15 @@ def context_of(study: str) -> Context:
     return Context(study_from_json(study))
 
 
-def step(state: LearnerState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[LearnerState]:
+def step(
+    state: LearnerState | None, message: Fact | Command, now: Stamp, timed_out: bool = False
+) -> Step[LearnerState]:
     """Fold one message of a session.
 
     Raises
     ------
-    NotYet
-        A report must wait for its decision or configuration, and ``late`` is not set.
+    InputsMissing
+        A report must wait for its decision or configuration, and ``timed_out`` is not set.
     UnknownThing, Conflict, Unavailable
         The report cannot be taken.
     """
@@ -136,7 +139,7 @@ def step(state: LearnerState | None, message: Fact | Command, now: Stamp, late: 
         case Decision():
             return _decided(state, message, now)
         case ReportPerformance():
-            return _reported(state, message, now, late)
+            return _reported(state, message, now, timed_out)
     return Step(state)
 
 
@@ -168,7 +171,7 @@ def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[Learne
         previous = None
     after = replace(
         state,
-        memory=learner.decided(context, state.memory, taken),
+        memory=learner.on_decision(context, state.memory, taken),
         open=opened,
         last=taken,
         decisions=decision.n,
@@ -180,12 +183,11 @@ def _decided(state: LearnerState, decision: Decision, now: Stamp) -> Step[Learne
     return _with_policy(after, facts, now)
 
 
-def _reported(state: LearnerState, command: ReportPerformance, now: Stamp, late: bool) -> Step[LearnerState]:
-    if state.phase != "live":
-        raise Conflict(f"session {state.session} has ended")
+def _reported(state: LearnerState, command: ReportPerformance, now: Stamp, timed_out: bool) -> Step[LearnerState]:
+    check_accepts(state.session, state.phase, command)
     if command.corrects is not None and command.corrects in state.reported:
         return _corrected(state, command, now)
-    _check_known(state, command, late)
+    _check_known(state, command, timed_out)
     decision_id = command.decision_id
     if decision_id in state.rewards:
         raise Conflict(f"decision {decision_id} has its performance already")
@@ -240,7 +242,7 @@ def _learned(state: LearnerState, performance: Performance, now: Stamp) -> Step[
 
 def _ended(state: LearnerState, now: Stamp) -> Step[LearnerState]:
     """What waited for a next decision that will not come is learned without one."""
-    if state.phase != "ending" or not state.rewards:
+    if not is_ending(state.phase) or not state.rewards:
         return Step(state)
     facts: list[Fact] = []
     for decision_id in list(state.rewards):
@@ -252,7 +254,7 @@ def _ended(state: LearnerState, now: Stamp) -> Step[LearnerState]:
 # --- pieces ---
 
 
-def _check_known(state: LearnerState, command: ReportPerformance, late: bool) -> None:
+def _check_known(state: LearnerState, command: ReportPerformance, timed_out: bool) -> None:
     behind = tuple(
         owner
         for owner, lacking in (
@@ -261,8 +263,8 @@ def _check_known(state: LearnerState, command: ReportPerformance, late: bool) ->
         )
         if lacking
     )
-    if behind and not late:
-        raise NotYet(behind, WAIT_S)
+    if behind and not timed_out:
+        raise InputsMissing(behind, WAIT_S)
     if state.config is None or state.decisions < command.need.decision:
         raise Unavailable(f"the learner has not heard all of the {' and the '.join(behind)} yet")
     if command.corrects is not None and command.decision_id not in state.open:
@@ -309,7 +311,7 @@ def _updated(state: LearnerState, decision_id: str, now: Stamp) -> tuple[Learner
     """Learn from a reported decision, with the one that followed it where there is one."""
     context, learner = _context(state), _learner(state)
     known, gained = state.open[decision_id], state.rewards[decision_id]
-    memory = learner.rewarded(context, state.memory, known.taken, gained, known.following)
+    memory = learner.on_reward(context, state.memory, known.taken, gained, known.following)
     row = state_of(learner, known.taken)
     transition = Transition(
         session=state.session, stamp=now, seen=_seen(state), decision_id=decision_id, task=known.task,

@@ -1,7 +1,7 @@
-"""What a learner is: three pure functions over a memory of its own, and a row of the policy.
+"""The interface of a learner: pure functions over its own memory, and the rows of its policy.
 
-A learner knows the scoring system (through :class:`Context`), never the person. Its memory is
-immutable by convention: each function gives a new one, so a failed commit leaves the old one standing.
+A learner knows the scoring system (through :class:`Context`), never the person. Its memory is immutable by
+convention: each function returns a new one, so a failed commit leaves the old one unchanged.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from shift_study.study import Study
 
 @dataclass(frozen=True)
 class Context:
-    """What every learner may know: the study, and what its scoring system suggests."""
+    """The knowledge of every learner: the study, and the suggestions of its scoring system."""
 
     study: Study
 
     @cached_property
     def suggestions(self) -> tuple[int, ...]:
-        """Index of the suggested action for each of the 30 triples, in their order."""
+        """The index of the suggested action for each of the 30 triples, in their order."""
         return suggestions(self.study.scoring)
 
     @cached_property
     def actions(self) -> int:
-        """How many actions there are."""
+        """The number of actions."""
         return len(self.study.scoring.actions)
 
     @cached_property
@@ -42,7 +42,7 @@ class Taken(NamedTuple):
     """A decision as a learner sees it."""
 
     n: int
-    """Its number, from 1."""
+    """The number of the decision, from 1."""
     triple: int
     """Index of the monitoring state, 0..29."""
     cognitive_state: int
@@ -50,11 +50,11 @@ class Taken(NamedTuple):
     action: int
     """Index of the action."""
     propensity: float | None
-    """None: an override."""
+    """None for an override."""
 
 
 class Row(NamedTuple):
-    """The policy in one state: true probabilities, the values behind them, reported visits."""
+    """The policy in one state: the exact probabilities, the values behind them, and the reported visits."""
 
     probabilities: list[float]
     values: list[float]
@@ -62,45 +62,45 @@ class Row(NamedTuple):
 
 
 class Learner(Protocol):
-    """A learner. ``memory`` is whatever its :meth:`initial` gives; ``dump`` makes plain JSON of it."""
+    """A learner. ``memory`` is of the type that :meth:`initial` returns."""
 
     name: str
     on_triples: bool
-    """Whether its states are the 30 triples, else the cognitive states."""
+    """Whether its states are the 30 triples; otherwise they are the cognitive states."""
 
     def initial(self, context: Context) -> Any:
-        """The memory before the first decision."""
+        """Return the memory before the first decision."""
 
-    def decided(self, context: Context, memory: Any, taken: Taken) -> Any:
-        """The memory after a decision was made (before its reward is known)."""
+    def on_decision(self, context: Context, memory: Any, taken: Taken) -> Any:
+        """Return the memory after a decision, before its reward is known."""
 
-    def rewarded(self, context: Context, memory: Any, taken: Taken, reward: float, following: Taken | None) -> Any:
-        """The memory after the reward of ``taken``.
+    def on_reward(self, context: Context, memory: Any, taken: Taken, reward: float, following: Taken | None) -> Any:
+        """Return the memory after the reward of ``taken``.
 
-        ``following`` is the next decision, given only where :meth:`needs_following` asks for it.
+        ``following`` is the next decision; it is given only if :meth:`needs_following` returns True.
         """
 
     def needs_following(self, context: Context) -> bool:
-        """Whether an update has to wait for the next state (a discount above 0)."""
+        """Return whether an update must wait for the next state (a discount above 0)."""
 
     def row(self, context: Context, memory: Any, state: int) -> Row:
-        """The row of the state with this index (cognitive state or triple) for the next decision."""
+        """Return the row of the state with this index (cognitive state or triple) for the next decision."""
 
     def epsilon(self, context: Context, memory: Any) -> float | None:
-        """Probability of exploring at the next decision, where the learner has one."""
+        """Return the probability of exploring at the next decision, or None if the learner has no such rate."""
 
     def dump(self, memory: Any) -> Any:
-        """The memory as plain JSON values."""
+        """Return the memory as plain JSON values."""
 
     def load(self, context: Context, data: Any) -> Any:
-        """The memory that :meth:`dump` wrote."""
+        """Return the memory that :meth:`dump` wrote."""
 
 
 def state_names(learner: Learner, context: Context) -> Sequence[str]:
-    """The names of the learner's states, in the order of their indices."""
+    """Return the names of the learner's states, in the order of their indices."""
     return [t.name for t in TRIPLES] if learner.on_triples else context.cognitive_states
 
 
 def state_of(learner: Learner, taken: Taken) -> int:
-    """The index of the learner's state in which a decision was made."""
+    """Return the index of the learner's state in which a decision was made."""
     return taken.triple if learner.on_triples else taken.cognitive_state

@@ -1,9 +1,9 @@
-"""The learner's shell: what it takes in, by whom. The worker does the rest."""
+"""The learner as a service: its core, and the streams that it reads."""
 
 from __future__ import annotations
 
-from shift_runtime.service.loop import Core
-from shift_schemas.keys import READS
+from shift_runtime.service.core import Core
+from shift_schemas.registry import READS
 
 from shift_learner import core
 from shift_learner.core import LearnerState

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import UnknownThing
+from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import Config, Decision, GazeChunk, Performance, Session
 from shift_schemas.timestamps import Stamp
 
@@ -27,7 +28,7 @@ from shift_monitor.state import MonitorState, dump, initial, load, study_in_forc
 __all__ = ["MonitorState", "dump", "gaze_chunk_of", "initial", "load", "observation_of", "step"]
 
 
-def step(state: MonitorState | None, event: object, now: Stamp, late: bool = False) -> Step[MonitorState]:
+def step(state: MonitorState | None, event: object, now: Stamp, timed_out: bool = False) -> Step[MonitorState]:
     """Apply one message.
 
     Parameters
@@ -36,15 +37,15 @@ def step(state: MonitorState | None, event: object, now: Stamp, late: bool = Fal
         None before the session's start.
     now
         The stamp of the facts.
-    late
+    timed_out
         Whether the message no longer waits for what it needs to be applied.
 
     Raises
     ------
     UnknownThing
         There is no such session.
-    NotYet
-        The session's configuration has not come yet; ``Unavailable`` instead if ``late`` is set.
+    InputsMissing
+        The session's configuration has not come yet; ``Unavailable`` instead if ``timed_out`` is set.
     Conflict
         Gaze for an ended session or from a source that was replaced.
     MalformedMessage
@@ -58,20 +59,20 @@ def step(state: MonitorState | None, event: object, now: Stamp, late: bool = Fal
         case Config():
             return publish(_on_config(state, event), now)
         case Decision():
-            return publish(_on_decision(state, event, late), now)
+            return publish(_on_decision(state, event, timed_out), now)
         case Performance():
-            return publish(_on_performance(state, event, late), now)
+            return publish(_on_performance(state, event, timed_out), now)
         case GazeInput():
-            return step_gaze(state, event, now, late)
+            return step_gaze(state, event, now, timed_out)
         case GazeChunk():
-            return step_gaze(state, GazeInput(event), now, late)
+            return step_gaze(state, GazeInput(event), now, timed_out)
     return Step(state)
 
 
 def _on_session(state: MonitorState | None, event: Session, now: Stamp) -> Step[MonitorState]:
     if state is None:
         return Step(initial(event))
-    if event.state == "live" or state.ended:
+    if accepts_input(event.state) or state.ended:
         return Step(state)
     if not state.study:
         return Step(replace(state, ended=True))
@@ -87,13 +88,13 @@ def _on_config(state: MonitorState, event: Config) -> MonitorState:
     return replace(state, capacity=Capacity(study.capacity.start), attention=initial_attention(len(study.aois)))
 
 
-def _on_decision(state: MonitorState, event: Decision, late: bool) -> MonitorState:
-    settings = study_in_force(state, late).study.capacity
+def _on_decision(state: MonitorState, event: Decision, timed_out: bool) -> MonitorState:
+    settings = study_in_force(state, timed_out).study.capacity
     return replace(state, capacity=apply_strategy(state.capacity, event.strategy, settings), decision=event.n)
 
 
-def _on_performance(state: MonitorState, event: Performance, late: bool) -> MonitorState:
-    study_in_force(state, late)
+def _on_performance(state: MonitorState, event: Performance, timed_out: bool) -> MonitorState:
+    study_in_force(state, timed_out)
     history = (correct_result if event.corrects else add_result)(state.awareness.get(event.task, History()), event)
     return replace(
         state,

@@ -57,16 +57,16 @@ class Continuation(NamedTuple):
     warnings: list[str]
 
 
-def step_gaze(state: MonitorState, gaze: GazeInput, now: Stamp, late: bool) -> Step[MonitorState]:
+def step_gaze(state: MonitorState, gaze: GazeInput, now: Stamp, timed_out: bool) -> Step[MonitorState]:
     """Apply one chunk of gaze, or answer a repeated one as before.
 
-    ``late`` says that the chunk no longer waits for the session's configuration. The errors are those of
+    ``timed_out`` says that the chunk no longer waits for the session's configuration. The errors are those of
     ``shift_monitor.core.step``.
     """
     chunk = gaze.chunk
     if state.ended:
         raise Conflict(f"session {state.session} has ended")
-    prepared = study_in_force(state, late)
+    prepared = study_in_force(state, timed_out)
     if (first := find_repeated(gaze)) is not None:
         return Step(state, result=gaze_result(chunk, first.accepted, state.version, first.warnings), repeat=True)
     _check_source(state, chunk)

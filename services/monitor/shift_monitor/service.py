@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from shift_runtime.service.loop import Core, Recall
-from shift_schemas.keys import READS
+from shift_runtime.service.core import Core, Recall
 from shift_schemas.messages import GazeChunk
+from shift_schemas.registry import READS
 
 from shift_monitor import core
 from shift_monitor.core import MonitorState
@@ -26,4 +26,5 @@ CORE: Core[MonitorState] = Core(
     reads=READS["monitor"],
     prepare=add_earlier_gaze,
     lookups={"gaze": ("source", "seq")},
+    streams={"gaze": GazeChunk},
 )

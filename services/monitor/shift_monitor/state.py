@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pydantic import TypeAdapter
-from shift_schemas.core_protocol import NotYet
+from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Unavailable
 from shift_schemas.messages import Session
 from shift_schemas.timestamps import Stamp
@@ -71,18 +71,18 @@ def load(text: str) -> MonitorState:
     return _STATE.validate_json(text)
 
 
-def study_in_force(state: MonitorState, late: bool) -> PreparedStudy:
+def study_in_force(state: MonitorState, timed_out: bool) -> PreparedStudy:
     """Return the session's prepared study.
 
     Raises
     ------
-    NotYet
+    InputsMissing
         The session's configuration has not come yet.
     Unavailable
-        The same, but ``late`` is set: there is no more waiting.
+        The same, but ``timed_out`` is set: there is no more waiting.
     """
     if state.study:
         return prepare_study(state.study)
-    if not late:
-        raise NotYet(("recorder",), CONFIG_WAIT_S)
+    if not timed_out:
+        raise InputsMissing(("recorder",), CONFIG_WAIT_S)
     raise Unavailable(f"the monitor has not read the configuration of session {state.session} yet")

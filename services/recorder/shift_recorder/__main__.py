@@ -2,12 +2,12 @@
 
 from shift_runtime.process import run_service
 
-from shift_recorder.service import CORE, RecorderWorker
+from shift_recorder.service import CORE, extend
 
 
 def main() -> None:
-    """Run it."""
-    run_service(CORE, RecorderWorker)
+    """Run the recorder."""
+    run_service(CORE, extend)
 
 
 if __name__ == "__main__":

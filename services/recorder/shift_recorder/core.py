@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 from pydantic import TypeAdapter
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import Conflict, FieldError, MalformedMessage, UnknownThing
+from shift_schemas.lifecycle import ENDED, LIVE, check_accepts, next_state
 from shift_schemas.messages import (
     MOST_WARNINGS,
     Command,
@@ -24,6 +25,7 @@ from shift_schemas.messages import (
     Mark,
     Marker,
     Session,
+    SessionEvent,
     StartSession,
 )
 from shift_schemas.timestamps import Stamp
@@ -35,6 +37,7 @@ class FinishSession(EndSession):
     """The second half of an end: the recording is finished. Its content is that of the end it completes."""
 
     procedure: ClassVar[str] = "end_session"
+    event: ClassVar[SessionEvent] = "finish"
 
     recording: str
     sha256: str
@@ -79,7 +82,9 @@ def session_answer(fact: Session) -> dict[str, Any]:
     return data
 
 
-def step(state: RecorderState | None, message: Fact | Command, now: Stamp, late: bool = False) -> Step[RecorderState]:
+def step(
+    state: RecorderState | None, message: Fact | Command, now: Stamp, timed_out: bool = False
+) -> Step[RecorderState]:
     """Carry out one command.
 
     Raises
@@ -95,7 +100,7 @@ def step(state: RecorderState | None, message: Fact | Command, now: Stamp, late:
         case FinishSession():
             return _finish(state, message)
         case EndSession():
-            return _end(state, now)
+            return _end(state, message, now)
         case Configure():
             return _configure(state, message, now)
         case Mark():
@@ -112,7 +117,7 @@ def _start(state: RecorderState | None, command: StartSession, now: Stamp) -> St
     fact = Session(
         session=command.session, stamp=now, participant=command.participant, study=study.study,
         condition=command.condition, seed=seed_of(command.session) if command.seed is None else command.seed,
-        state="live", started=now, replay_of=command.replay_of,
+        state=LIVE, started=now, replay_of=command.replay_of,
         software=command.software, revision=command.revision, format=command.format,
         warnings=_start_warnings(study, command),
     )  # fmt: skip
@@ -141,10 +146,11 @@ def _start_warnings(study: Study, command: StartSession) -> list[str]:
     return [warning, *command.warnings][:MOST_WARNINGS]
 
 
-def _end(state: RecorderState, now: Stamp) -> Step[RecorderState]:
-    if state.fact.state != "live":
+def _end(state: RecorderState, command: EndSession, now: Stamp) -> Step[RecorderState]:
+    after = next_state(state.fact.state, command)
+    if after == state.fact.state:
         return Step(state)
-    fact = state.fact.model_copy(update={"stamp": now, "state": "ending"})
+    fact = state.fact.model_copy(update={"stamp": now, "state": after})
     return Step(replace(state, fact=fact), (fact,))
 
 
@@ -154,21 +160,21 @@ def ended(state: RecorderState) -> Session:
     The end has the time at which it was accepted, which is committed: each attempt to finish says the same.
     """
     name = f"{state.fact.session}.mcap"
-    return state.fact.model_copy(update={"state": "ended", "ended": state.fact.stamp, "recording": name})
+    return state.fact.model_copy(update={"state": ENDED, "ended": state.fact.stamp, "recording": name})
 
 
 def _finish(state: RecorderState, command: FinishSession) -> Step[RecorderState]:
     update = {"sha256": command.sha256, "counts": command.counts, "recording": command.recording}
     fact = ended(state).model_copy(update=update)
     result = {
-        "session": fact.session, "state": "ended", "recording": fact.recording,
+        "session": fact.session, "state": fact.state, "recording": fact.recording,
         "sha256": fact.sha256, "counts": fact.counts,
     }  # fmt: skip
     return Step(replace(state, fact=fact), (fact,), result)
 
 
 def _configure(state: RecorderState, command: Configure, now: Stamp) -> Step[RecorderState]:
-    _check_live(state)
+    check_accepts(command.session, state.fact.state, command)
     before = study_from_json(state.config.study)
     after = patched(before, command.patch)
     check_changeable(before, after)
@@ -192,11 +198,6 @@ def check_changeable(before: Study, after: Study) -> None:
 
 
 def _mark(state: RecorderState, command: Mark, now: Stamp) -> Step[RecorderState]:
-    _check_live(state)
+    check_accepts(command.session, state.fact.state, command)
     fact = Marker(session=command.session, stamp=now, marker_id=command.command_id, text=command.text)
     return Step(state, (fact,), fact)
-
-
-def _check_live(state: RecorderState) -> None:
-    if state.fact.state != "live":
-        raise Conflict(f"session {state.fact.session} has ended")

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from shift_schemas.errors import Conflict, DamagedRecording, shorten
-from shift_schemas.keys import OWNER_OF, OWNERS, SUBJECTS
+from shift_schemas.registry import OWNER_OF, OWNERS, SUBJECTS
 
 from shift_recording.checksum import checksum_path, sha256_of, write_checksum
 from shift_recording.durable_file import DurableFile, make_folder, replace, storage_errors, sync_folder

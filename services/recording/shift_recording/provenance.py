@@ -15,6 +15,9 @@ from shift_recording.mcap.writer import CONFIG_METADATA, SESSION_METADATA
 STUDY = "study.json"
 """The attachment with the study as it was given, before its condition."""
 
+FORMAT_IN_METADATA = 3
+"""The first format that the metadata names: the recordings of earlier formats must stay as they are."""
+
 
 def metadata_of(fact: Session, config: Config) -> dict[str, dict[str, str]]:
     """The metadata records, by name; stamps are seconds since the epoch, '' is none."""
@@ -30,6 +33,7 @@ def metadata_of(fact: Session, config: Config) -> dict[str, dict[str, str]]:
             "replay_of": fact.replay_of,
             "software": f"shift-mesh/{fact.software}",
             "revision": fact.revision,
+            **({"format": str(fact.format)} if fact.format >= FORMAT_IN_METADATA else {}),
         },
         CONFIG_METADATA: {"version": str(config.version), "study": config.study},
     }

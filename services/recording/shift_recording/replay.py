@@ -19,8 +19,9 @@ from shift_runtime.reader import REPLAY_MARK
 from shift_schemas.codec import decode, encode, encoding_of
 from shift_schemas.errors import Conflict, DamagedRecording, MalformedMessage, shorten
 from shift_schemas.ids import is_id, not_an_id
-from shift_schemas.keys import SUBJECTS, FactKey, ServiceKey, build_key
+from shift_schemas.keys import FactKey, ServiceKey, build_key
 from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, Session
+from shift_schemas.registry import SUBJECTS
 from shift_schemas.suggestions import did_you_mean
 from shift_schemas.timestamps import NS
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from shift_schemas.errors import DamagedRecording, MalformedMessage
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Session
 from shift_schemas.timestamps import NS
 
@@ -78,7 +79,7 @@ def info_of(path: Path) -> RecordingInfo:
     recording = Recording(path)
     scanned = _scanned(recording)
     said, fact, report = recording.metadata.get(SESSION_METADATA, {}), scanned.session, recording.report
-    ended = fact is not None and fact.state == "ended"
+    ended = fact is not None and has_ended(fact.state)
     return RecordingInfo(
         file=path.name,
         bytes=path.stat().st_size,

@@ -13,7 +13,7 @@ from functools import partial
 
 import structlog
 from shift_runtime.clock import Clock
-from shift_runtime.mesh_api import READ_WAIT_S, CommandDoor, new_id
+from shift_runtime.mesh_api import READ_WAIT_S, MeshApi, new_id
 from shift_runtime.metrics import Metrics
 from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import Decision, Fact
@@ -42,7 +42,7 @@ class Bridge:
 
     backend: Backend
 
-    def __init__(self, settings: BridgeSettings, door: CommandDoor, metrics: Metrics, clock: Clock) -> None:
+    def __init__(self, settings: BridgeSettings, door: MeshApi, metrics: Metrics, clock: Clock) -> None:
         self.settings = settings
         self.door = door
         self.metrics = metrics
@@ -159,7 +159,7 @@ class Bridge:
 
     def _put_out_first(self, session: str, decision_id: str, text: str) -> None:
         """A decision is heard before it is acknowledged; should we die in between, nobody was told that it is made."""
-        if decision_id not in self.door.replica.views[session].decisions:
+        if decision_id not in self.door.read_model.views[session].decisions:
             self._ahead.add(decision_id)
             self.backend.publish("decision", text)
 
@@ -176,7 +176,7 @@ class Bridge:
                 await self._attach(self.session)
                 self._bound = self.session in self._attached
                 if not self._bound:
-                    self.diagnostics.now(f"waits: for the {', the '.join(self.door.replica.missing)}")
+                    self.diagnostics.now(f"waits: for the {', the '.join(self.door.read_model.missing)}")
             except UnknownThing:
                 await self._begin()
             except ShiftError as e:
@@ -203,8 +203,8 @@ class Bridge:
         """Put out what becomes known of a session from now on. Raises :class:`UnknownThing` where there is none."""
         if session in self._attached:
             return
-        view = await self.door.replica.view(session)
-        if session not in self._attached and not self.door.replica.missing:  # what is old is not told again
+        view = await self.door.read_model.view(session)
+        if session not in self._attached and not self.door.read_model.missing:  # what is old is not told again
             self._attached.add(session)
             view.listeners.append(self._put_out)
 

@@ -7,7 +7,7 @@ from collections import OrderedDict
 from collections.abc import Awaitable, Callable
 
 import structlog
-from shift_runtime.mesh_api import CommandDoor
+from shift_runtime.mesh_api import MeshApi
 from shift_schemas.errors import MalformedMessage, ShiftError, Unavailable
 
 from shift_ros2.completion import Progress
@@ -25,7 +25,7 @@ class GazeSender:
     """One lane and the task that empties it. ``attach`` makes sure of the session; ``lost`` is told what fell out."""
 
     def __init__(
-        self, door: CommandDoor, settings: BridgeSettings, session: str,
+        self, door: MeshApi, settings: BridgeSettings, session: str,
         attach: Callable[[str], Awaitable[None]], lost: Lost,
     ) -> None:  # fmt: skip
         self._door = door
@@ -124,7 +124,7 @@ class GazeSender:
 
     async def _first_seq(self, source: str) -> int:
         """Where the source's numbers go on: another bridge, or this one before a restart, may have begun them."""
-        replica = self._door.replica
+        replica = self._door.read_model
         view = await replica.view(self._session)
         if not await replica.reader.pull("monitor"):
             raise Unavailable("the monitor does not answer, so nobody knows how far this gaze source came")

@@ -12,11 +12,11 @@ import structlog
 from shift_runtime.bus.zenoh import ZenohBus
 from shift_runtime.clock import SystemClock
 from shift_runtime.logs import configure_logs
-from shift_runtime.mesh_api import CommandDoor
+from shift_runtime.mesh_api import MeshApi
 from shift_runtime.mesh_client import MeshClient
 from shift_runtime.metrics import Metrics
 from shift_runtime.process import run_loop
-from shift_runtime.read_model import Replica
+from shift_runtime.read_model import ReadModel
 from shift_schemas.codec import encode
 from shift_schemas.errors import ShiftError
 from shift_schemas.keys import ServiceKey, build_key
@@ -48,8 +48,8 @@ async def serve(settings: BridgeSettings) -> None:
     _on_signal(stop.set)
     bus = await ZenohBus.open(settings.zenoh, settings.listen)
     metrics = Metrics(SERVICE)
-    replica = Replica(bus, metrics.dropped, metrics.link_lost)
-    bridge = Bridge(settings, CommandDoor(MeshClient(bus, settings.patience_s), replica), metrics, SystemClock())
+    replica = ReadModel(bus, metrics.dropped, metrics.link_lost)
+    bridge = Bridge(settings, MeshApi(MeshClient(bus, settings.patience_s), replica), metrics, SystemClock())
     replica.reader.start()
     pulling = asyncio.create_task(replica.reader.run())
     try:

@@ -21,6 +21,7 @@ from shift_schemas.messages import Health
 from shift_schemas.timestamps import Stamp
 
 from shift_runtime.bus.protocol import Bus, Reply
+from shift_runtime.polling import poll
 
 JOIN_WAIT_S = 1.0
 """How long a service waits for its first link before it begins without having asked; it asks again later."""
@@ -68,10 +69,7 @@ class Claim:
 
     async def make(self) -> None:
         """Ask before anything is answered. Raises :class:`OwnedElsewhere` where another mesh has the key."""
-        for _ in range(round(JOIN_WAIT_S / 0.01)):
-            if self.bus.joined:
-                break
-            await asyncio.sleep(0.01)
+        await poll(self._joined, timeout_s=JOIN_WAIT_S, pause_s=0.01)
         for other in await self._others():
             raise OwnedElsewhere(self._refusal(other))
 
@@ -85,6 +83,9 @@ class Claim:
                 if other.since is None or (other.since.ns, other.mesh) < (self.since.ns, self.mesh):
                     raise OwnedElsewhere(self._refusal(other))
             self.conflict = self._warning(others[0]) if others else ""
+
+    async def _joined(self) -> bool:
+        return self.bus.joined
 
     async def _others(self) -> list[Health]:
         replies = await self.bus.get(build_key(ServiceKey(self.service, "health")), timeout_s=ASK_S)

@@ -20,18 +20,7 @@ from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
 
 from shift_runtime.claim import mesh_id
-
-_TABLES = """
-CREATE TABLE IF NOT EXISTS outbox (
-    session TEXT, seq INTEGER, subject TEXT, payload TEXT, PRIMARY KEY (session, seq)) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS cursor (
-    session TEXT, owner TEXT, seq INTEGER, PRIMARY KEY (session, owner)) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS state (session TEXT PRIMARY KEY, data TEXT, closed INTEGER DEFAULT 0) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS answer (
-    session TEXT, procedure TEXT, command_id TEXT, content TEXT, result TEXT,
-    PRIMARY KEY (session, procedure, command_id)) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS place (one INTEGER PRIMARY KEY, file TEXT);
-"""
+from shift_runtime.journal_schema import migrate, schema_version
 
 LOG_PAGES, PAGE_BYTES = 1000, 4096
 """SQLite's own: after so many pages in the log there is a checkpoint, and it begins at its start again."""
@@ -97,7 +86,9 @@ class Journal:
         Raises
         ------
         InvalidSettings
-            The folder cannot be written.
+            The folder cannot be written, or the file is damaged.
+        NewerJournal
+            A newer shift-mesh wrote the file.
         """
         self.owner = owner
         self.path = path
@@ -108,8 +99,7 @@ class Journal:
             self._db = sqlite3.connect(path, isolation_level=None, timeout=5.0)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
-            self._db.executescript(_TABLES)
-            self._rename_digests()
+            migrate(self._db, path)
             self._check_copy()
             self.heads = self._heads()
             for subject, fields in self._lookups.items():
@@ -151,11 +141,6 @@ class Journal:
                 "the disk is faulty; stop the mesh and copy the folder again, or go on with the original"
             )
         self._db.execute("INSERT OR REPLACE INTO place VALUES (1, ?)", (place,))
-
-    def _rename_digests(self) -> None:
-        """Bring a journal of version 0.1.0 to this one's columns."""
-        if any(row[1] == "digest" for row in self._db.execute("PRAGMA table_info(answer)")):
-            self._db.execute("ALTER TABLE answer RENAME COLUMN digest TO content")
 
     def _grow_log(self) -> None:
         """Give the write-ahead log its full length now: a commit that overwrites syncs faster than one that appends.
@@ -259,8 +244,7 @@ class Journal:
             It does not.
         """
         with self._transaction():
-            (number,) = self._db.execute("PRAGMA user_version").fetchone()
-            self._db.execute(f"PRAGMA user_version = {(number + 1) % 2**31}")
+            self._db.execute(f"PRAGMA user_version = {schema_version(self._db)}")  # SQLite writes it though it is equal
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

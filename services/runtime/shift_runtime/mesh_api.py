@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from shift_schemas.errors import Unavailable, UnknownThing
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import (
     END_ID,
     START_ID,
@@ -28,7 +29,7 @@ from shift_schemas.messages import (
 from shift_schemas.requests import MarkerBody, OverrideBody, PerformanceBody, StartBody
 
 from shift_runtime.mesh_client import MeshClient
-from shift_runtime.read_model import Replica, View
+from shift_runtime.read_model import ReadModel, SessionView
 
 READ_WAIT_S = 2.0
 """How long a read waits for what it must have in it, at least; a study's ``wait_s`` can make it longer."""
@@ -39,12 +40,12 @@ def new_id(prefix: str) -> str:
     return f"{prefix}{secrets.token_hex(8)}"
 
 
-class CommandDoor:
+class MeshApi:
     """See the module."""
 
-    def __init__(self, mesh: MeshClient, replica: Replica) -> None:
+    def __init__(self, mesh: MeshClient, read_model: ReadModel) -> None:
         self.mesh = mesh
-        self.replica = replica
+        self.read_model = read_model
 
     async def start(self, body: StartBody) -> tuple[dict[str, Any], bool]:
         """Begin a session; return the session and whether it was begun before, by the same start.
@@ -57,7 +58,7 @@ class CommandDoor:
             seed=body.seed, condition=body.condition,
         )  # fmt: skip
         answer = await self.mesh.command(command)
-        view = await self.replica.view(session)
+        view = await self.read_model.view(session)
         self._remember(session, answer, config=1)
         if not answer.repeat:
             return answer.result, False
@@ -66,26 +67,26 @@ class CommandDoor:
 
     async def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Hand gaze to the monitor; acknowledged once it is in the journal."""
-        await self.replica.view(session)
+        await self.read_model.view(session)
         answer = await self.mesh.gaze(session, chunk)
         self._remember(session, answer, observation=answer.result["observation"])
         return {name: answer.result[name] for name in ("accepted", "warnings") if name in answer.result}
 
     async def decide(self, session: str, task: str, decision_id: str | None = None) -> tuple[dict[str, Any], bool]:
         """The next decision."""
-        view = await self.replica.view(session)
-        command = Decide(command_id=decision_id or new_id("d-"), session=session, task=task, need=view.need)
+        view = await self.read_model.view(session)
+        command = Decide(command_id=decision_id or new_id("d-"), session=session, task=task, need=view.required)
         answer = await self.mesh.command(command, wait_s=await self._wait_s(view))
         self._remember(session, answer, decision=answer.result["n"])
         return answer.result, answer.repeat
 
     async def report(self, session: str, body: PerformanceBody) -> tuple[dict[str, Any], bool]:
         """How the task went."""
-        view = await self.replica.view(session)
-        if view.fact.state != "ended":
+        view = await self.read_model.view(session)
+        if not has_ended(view.fact.state):
             await self._check_decision(session, view, body.decision_id)
         command = ReportPerformance(
-            command_id=new_id("c-") if body.corrects else body.decision_id, session=session, need=view.need,
+            command_id=new_id("c-") if body.corrects else body.decision_id, session=session, need=view.required,
             comprehension=body.comprehension, enabledness=body.enabledness,
             corrects=body.decision_id if body.corrects else None,
         )  # fmt: skip
@@ -98,30 +99,30 @@ class CommandDoor:
 
     async def override(self, session: str, body: OverrideBody) -> tuple[dict[str, Any], bool]:
         """Choose the task's next strategy."""
-        view = await self.replica.view(session)
+        view = await self.read_model.view(session)
         command = SetOverride(
-            command_id=body.override_id or new_id("o-"), session=session, need=view.need,
+            command_id=body.override_id or new_id("o-"), session=session, need=view.required,
             task=body.task, strategy=body.strategy, reason=body.reason,
         )  # fmt: skip
         return await self._plain(session, command, await self._wait_s(view))
 
     async def mark(self, session: str, body: MarkerBody) -> tuple[dict[str, Any], bool]:
         """Note something."""
-        await self.replica.view(session)
+        await self.read_model.view(session)
         return await self._plain(
             session, Mark(command_id=body.marker_id or new_id("m-"), session=session, text=body.text)
         )
 
     async def configure(self, session: str, patch: dict[str, Any]) -> dict[str, Any]:
         """Change the study in force."""
-        await self.replica.view(session)
+        await self.read_model.view(session)
         answer = await self.mesh.command(Configure(command_id=new_id("c-"), session=session, patch=patch))
         self._remember(session, answer, config=answer.result["version"])
         return answer.result
 
     async def end(self, session: str) -> dict[str, Any]:
         """End the session; answered once its recording is finished."""
-        await self.replica.view(session)
+        await self.read_model.view(session)
         answer = await self.mesh.command(EndSession(command_id=END_ID, session=session), wait_s=10.0)
         self._remember(session, answer)
         return answer.result
@@ -132,27 +133,27 @@ class CommandDoor:
         return answer.result, answer.repeat
 
     def _remember(self, session: str, answer: Answer, **counts: int) -> None:
-        view = self.replica.views.get(session)
+        view = self.read_model.views.get(session)
         if view is not None:
             for count, number in counts.items():
                 view.answered[count] = max(view.answered[count], number)
             view.sequences[answer.owner] = max(view.sequences.get(answer.owner, 0), answer.seq)
 
-    async def _wait_s(self, view: View) -> float:
+    async def _wait_s(self, view: SessionView) -> float:
         await self._read(view, ("recorder",))
         return view.study.decider.wait_s
 
-    async def _check_decision(self, session: str, view: View, decision_id: str) -> None:
+    async def _check_decision(self, session: str, view: SessionView, decision_id: str) -> None:
         if decision_id not in view.decisions:
-            if not await self.replica.reader.pull("decider"):
+            if not await self.read_model.reader.pull("decider"):
                 raise Unavailable("the decider does not answer, so nobody knows whether there is such a decision")
             if decision_id not in view.decisions:
                 raise UnknownThing(f"session {session} has no decision {decision_id}")
 
-    async def _read(self, view: View, owners: tuple[str, ...]) -> None:
+    async def _read(self, view: SessionView, owners: tuple[str, ...]) -> None:
         """Wait until what these owners answered through this door has been read back."""
         session = view.fact.session
         for owner in owners:
-            there = partial(self.replica.has_read, session, owner)
-            if not there() and not await self.replica.wait(session, (owner,), there, READ_WAIT_S):
+            there = partial(self.read_model.has_read, session, owner)
+            if not there() and not await self.read_model.wait(session, (owner,), there, READ_WAIT_S):
                 raise Unavailable(f"the {owner} does not answer")

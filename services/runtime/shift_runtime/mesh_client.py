@@ -10,8 +10,9 @@ import asyncio
 
 from shift_schemas.codec import M, decode, encode
 from shift_schemas.errors import MalformedMessage, Problem, Unavailable
-from shift_schemas.keys import PROCEDURE_OWNER, STREAMS, CommandKey, ServiceKey, StreamKey, build_key
+from shift_schemas.keys import CommandKey, ServiceKey, StreamKey, build_key
 from shift_schemas.messages import Answer, Command, GazeChunk, Health
+from shift_schemas.registry import PROCEDURE_OWNER, STREAMS
 
 from shift_runtime.bus.protocol import Bus, Reply, first_answer
 from shift_runtime.claim import healths_of, one_health

@@ -1,4 +1,4 @@
-"""A door's own replica: the latest of every session, folded from all owners' facts.
+"""A door's own read_model: the latest of every session, folded from all owners' facts.
 
 Reads are answered from it. It has no journal: it reads the owners' from the start,
 and until it has, it says that it does not know yet.
@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from shift_schemas.errors import Unavailable, UnknownThing
-from shift_schemas.keys import OWNERS
 from shift_schemas.messages import (
     Config,
     Decision,
@@ -24,18 +23,19 @@ from shift_schemas.messages import (
     Seen,
     Session,
 )
+from shift_schemas.registry import OWNERS
 from shift_study.loading import study_from_json
 from shift_study.study import Study
 
 from shift_runtime.bus.protocol import Bus
 from shift_runtime.reader import Reader, ReadFact
 
-HINT_WAIT_S = 0.05
+NOTIFICATION_WAIT_S = 0.05
 Listener = Callable[[Fact, str], None]
 
 
 @dataclass
-class View:
+class SessionView:
     """One session as far as the replica has read, and what was answered through this door."""
 
     fact: Session
@@ -63,7 +63,7 @@ class View:
         return study_from_json(self.config.study)
 
     @property
-    def need(self) -> Seen:
+    def required(self) -> Seen:
         """What an answer must have in it: what this door answered, and what it has read."""
         answered = self.answered
         return Seen(
@@ -74,13 +74,13 @@ class View:
         )
 
 
-class Replica:
+class ReadModel:
     """All sessions."""
 
     def __init__(
         self, bus: Bus, dropped: Callable[[str], None], lost: Callable[[str], None] = lambda owner: None
     ) -> None:
-        self.views: dict[str, View] = {}
+        self.views: dict[str, SessionView] = {}
         self.reader = Reader(bus, tuple(OWNERS), {}, self._deliver, dropped, closed=True, lost=lost)
 
     @property
@@ -88,7 +88,7 @@ class Replica:
         """Owners whose journals have not been read yet."""
         return tuple(sorted(set(OWNERS) - self.reader.synced))
 
-    async def view(self, session: str) -> View:
+    async def view(self, session: str) -> SessionView:
         """The session's view.
 
         Raises
@@ -114,19 +114,19 @@ class Replica:
         view = self.views[session]
         loop = asyncio.get_running_loop()
         start = loop.time()
-        hint_until = start + min(HINT_WAIT_S, wait_s / 2)
+        notification_until = start + min(NOTIFICATION_WAIT_S, wait_s / 2)
         while not there():
             left = start + wait_s - loop.time()
             if left <= 0:
                 return False
             view.changed.clear()
-            if loop.time() >= hint_until:
+            if loop.time() >= notification_until:
                 await self.reader.pull_all(owners)
                 if there():
                     return True
-                hint_until = loop.time() + 4 * HINT_WAIT_S
+                notification_until = loop.time() + 4 * NOTIFICATION_WAIT_S
             try:
-                pause = min(left, max(0.001, hint_until - loop.time()))
+                pause = min(left, max(0.001, notification_until - loop.time()))
                 await asyncio.wait_for(view.changed.wait(), pause)
             except TimeoutError:
                 continue
@@ -142,7 +142,7 @@ class Replica:
         view = self.views.get(fact.session)
         if isinstance(fact, Session):
             if view is None:
-                view = self.views[fact.session] = View(fact)
+                view = self.views[fact.session] = SessionView(fact)
             view.fact = fact
         if view is None:
             view = self._early(read)
@@ -154,14 +154,14 @@ class Replica:
         for listener in view.listeners:
             listener(fact, read.payload)
 
-    def _early(self, read: ReadFact) -> View | None:
+    def _early(self, read: ReadFact) -> SessionView | None:
         """A fact of a session that the recorder has not told of yet: it is read again once it has."""
         self.reader.cursors[read.fact.session, read.owner] = read.seq - 1
         self.reader.pull_soon("recorder")
         return None
 
 
-def _fold(view: View, fact: Fact) -> None:
+def _fold(view: SessionView, fact: Fact) -> None:
     match fact:
         case Config():
             view.config = fact

@@ -14,18 +14,22 @@ from dataclasses import dataclass, field
 import structlog
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import MalformedMessage
-from shift_schemas.keys import OWNER_OF, OWNERS, ROOT, FactKey, ServiceKey, build_key, parse_key
-from shift_schemas.messages import FACTS, Fact, OutboxPage, OutboxQuery, OutboxRow
+from shift_schemas.keys import ROOT, FactKey, ServiceKey, build_key, parse_key
+from shift_schemas.messages import Fact, OutboxPage, OutboxQuery, OutboxRow, Session
+from shift_schemas.registry import FACTS, OWNER_OF, OWNERS
 
 from shift_runtime.bus.protocol import Bus, Incoming, Reply, first_answer
 from shift_runtime.links import Links
+from shift_runtime.polling import poll
 
 log = structlog.get_logger()
 
 PULL_EVERY_S = 0.5
 PULL_TIMEOUT_S = 1.0
-FIRST_TRIES, FIRST_PAUSE_S = 20, 0.05
-"""How often the recorder is asked at the start before the others are read without it; chosen: a second."""
+FIRST_WAIT_S, FIRST_PAUSE_S = 1.0, 0.05
+"""How long the session owner is asked at the start before the others are read without it; chosen: a short start."""
+SESSION_OWNER = OWNER_OF[Session.subject]
+"""The owner whose facts say that a session exists."""
 REPLAY_MARK = b"replay:"
 """Before the sequence of what is replayed: tools that listen hear it, a reader passes over it."""
 
@@ -90,10 +94,8 @@ class Reader:
 
     async def run(self) -> None:
         """Pull every owner for ever, the recorder first: no session is known before it said so."""
-        for _ in range(FIRST_TRIES if "recorder" in self.owners else 0):
-            if await self.pull("recorder"):
-                break
-            await asyncio.sleep(FIRST_PAUSE_S)
+        if SESSION_OWNER in self.owners:
+            await poll(lambda: self.pull(SESSION_OWNER), timeout_s=FIRST_WAIT_S, pause_s=FIRST_PAUSE_S)
         while True:
             await asyncio.gather(*(self.pull(owner) for owner in self.owners))
             await self.links.keep(self.pull)
@@ -169,7 +171,7 @@ class Reader:
                 return answered
 
     async def _pull(self, owner: str, session: str | None) -> bool:
-        knows_sessions = owner == "recorder" or "recorder" in self.synced or "recorder" not in self.owners
+        knows_sessions = owner == SESSION_OWNER or SESSION_OWNER in self.synced or SESSION_OWNER not in self.owners
         past: dict[str, int] = {}
         """Heads of sessions that are done: an owner that has not closed them offers them from their start."""
         while True:
@@ -177,7 +179,7 @@ class Reader:
             query = OutboxQuery(
                 cursors=cursors | past,
                 only=None if session is None else [session],
-                closed=self.closed and owner == "recorder",
+                closed=self.closed and owner == SESSION_OWNER,
             )
             page = await self._page(owner, query)
             if page is None:

@@ -17,6 +17,7 @@ from shift_runtime.logs import configure_logs
 from shift_runtime.rest_client import RestClient
 from shift_runtime.settings import MeshSettings, read_settings
 from shift_schemas.errors import Conflict, ShiftError, Unavailable
+from shift_schemas.lifecycle import LIVE
 
 from shift_simulator.live import drive
 from shift_simulator.users import paper_user
@@ -58,7 +59,7 @@ def _live(settings: DemoSettings, stop: threading.Event) -> None:
         session = "demo" if number == 1 else f"demo-{number}"
         try:
             with RestClient(settings.url, patience_s=5.0) as shift:
-                if shift.start("P00", session=session, study="default")["state"] != "live":
+                if shift.start("P00", session=session, study="default")["state"] != LIVE:
                     number += 1
                     continue
                 log.info("the simulated person begins", session=session, user=settings.demo_user)

@@ -116,17 +116,17 @@ class BatchPlanner:
 
     def __init__(self, context: Context, runs: int) -> None:
         self._model = engine.model_of(context)
-        self._state = engine.start(self._model, runs)
+        self._state = engine.initial(self._model, runs)
 
     def decide(self, triple: Ints, u: Floats) -> Ints:
         """The best action, the first of equals."""
         action: Ints = engine.values_at(self._model, self._state, triple).argmax(axis=1)
-        self._state = engine.decided(self._model, self._state, triple, action)
+        self._state = engine.on_decision(self._model, self._state, triple, action)
         return action
 
     def learn(self, triple: Ints, action: Ints, reward: Floats) -> None:
         """A reward above 0 is a success."""
-        self._state = engine.rewarded(self._model, self._state, triple, action, reward > 0)
+        self._state = engine.on_result(self._model, self._state, triple, action, reward > 0)
 
 
 class OneByOne:
@@ -150,11 +150,11 @@ class OneByOne:
         row = self._learner.row(self._context, memory, triple if self._learner.on_triples else state).probabilities
         action = pick(row, u)
         taken = Taken(self._n, triple, state, action, row[action])
-        self._memories[run] = self._learner.decided(self._context, memory, taken)
+        self._memories[run] = self._learner.on_decision(self._context, memory, taken)
         return taken
 
     def learn(self, triple: Ints, action: Ints, reward: Floats) -> None:
         """Each run's memory after its reward; a discount has no meaning here."""
         for run, taken in enumerate(self._taken):
             memory = self._memories[run]
-            self._memories[run] = self._learner.rewarded(self._context, memory, taken, float(reward[run]), None)
+            self._memories[run] = self._learner.on_reward(self._context, memory, taken, float(reward[run]), None)

@@ -14,6 +14,7 @@ from shift_decider import core as decider
 from shift_learner import core as learner
 from shift_model.vocabulary import Triple
 from shift_monitor import core as monitor
+from shift_schemas.lifecycle import LIVE
 from shift_schemas.messages import (
     FORMAT,
     Config,
@@ -79,7 +80,7 @@ class Mesh:
         self._chunks = 0
         start = Session(
             session=SESSION, stamp=self._now, participant="P00", study=self.study.study, seed=self.seed,
-            state="live", started=self._now, format=FORMAT,
+            state=LIVE, started=self._now, format=FORMAT,
         )  # fmt: skip
         self._pass_on(start)
         self._pass_on(Config(session=SESSION, stamp=self._now, version=1, study=study_json(self.study)))

@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+from shift_model.thresholds import below
 from shift_model.vocabulary import TRIPLES
 from shift_schemas.errors import FieldError
 
 from shift_study.area_checks import area_mistakes, area_warnings
 from shift_study.loading import study_in_force
-from shift_study.scoring import MARGIN, scores
+from shift_study.scoring import scores
 from shift_study.study import LearnerSettings, ScoringTable, Study
 
 PRIOR = frozenset({"scoring_prior", "prior_value"})
@@ -112,7 +113,7 @@ def _levels_out_of_reach(study: Study) -> Iterator[str]:
     for name, strategy in study.scoring.strategies.items():
         largest = max(score[name] for score in reached)
         for level, threshold in zip(strategy.levels[1:], strategy.thresholds, strict=True):
-            if threshold > largest + MARGIN:
+            if below(largest, threshold):
                 yield (
                     f"scoring.strategies.{name}: the scoring system never suggests {level}, since its threshold is "
                     f"{threshold:g} and the largest score is {largest:g}"

@@ -1,7 +1,7 @@
-"""The scoring system H_S and the threshold ranking (paper, section III-C, Table I).
+"""The study's scoring table, applied to the 30 triples (paper, section III-C, Table I). Pure.
 
-Pure. The table is data (the study's); this module adds it up and ranks the sums. It lies with the schemas and
-not with the decider because learners take the suggestion as their prior, and no core imports another.
+The arithmetic is in ``shift_model.scoring``; the table is the study's. This module is in the study's room and not in
+the decider's, because learners use the suggestion as their prior and no core imports another.
 """
 
 from __future__ import annotations
@@ -9,18 +9,16 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
+from shift_model.scoring import action_index, level_index, scaffolding_score
 from shift_model.vocabulary import TRIPLES, Triple
 from shift_schemas.messages import TripleView
 
 from shift_study.loading import study_from_json
 from shift_study.study import ScoringSettings
 
-MARGIN = 1e-9
-"""Scores are sums of thirds: a score that equals a threshold must not fall below it by rounding."""
-
 
 class Reduction(NamedTuple):
-    """What the scoring system makes of one triple."""
+    """The result of the scoring system for one triple."""
 
     scores: dict[str, float]
     action: int
@@ -28,40 +26,35 @@ class Reduction(NamedTuple):
 
 
 def scores(settings: ScoringSettings, triple: Triple) -> dict[str, float]:
-    """Each strategy's score: its weight x the sum of the table's three entries / S_max."""
+    """Return each strategy's score, from the table's three entries for the triple."""
     rows = settings.table.rows(triple)
     return {
-        name: strategy.weight * sum(row[name] for row in rows) / settings.s_max
+        name: scaffolding_score((row[name] for row in rows), strategy.weight, settings.s_max)
         for name, strategy in settings.strategies.items()
     }
 
 
-def rank(score: float, thresholds: list[float]) -> int:
-    """Index of the level: how many of the rising thresholds the score reaches."""
-    return sum(score >= threshold - MARGIN for threshold in thresholds)
-
-
 def reduce(settings: ScoringSettings, triple: Triple) -> Reduction:
-    """Scores, the suggested action's index and the cognitive state, which *is* that action."""
+    """Return the scores, the suggested action's index and the cognitive state, which *is* that action."""
     found = scores(settings, triple)
-    action = 0
-    for name, strategy in settings.strategies.items():
-        action = action * len(strategy.levels) + rank(found[name], strategy.thresholds)
+    strategies = settings.strategies
+    levels = (level_index(found[name], strategy.thresholds) for name, strategy in strategies.items())
+    action = action_index(levels, (len(strategy.levels) for strategy in strategies.values()))
     return Reduction(found, action, settings.states[action])
 
 
 @lru_cache(maxsize=64)
 def reductions(study: str) -> dict[Triple, Reduction]:
-    """What the scoring system makes of each of the 30 triples; the study in force as ``config`` facts carry it."""
+    """Return the result for each of the 30 triples; ``study`` is the study in force as ``config`` facts carry it."""
     settings = study_from_json(study).scoring
     return {triple: reduce(settings, triple) for triple in TRIPLES}
 
 
 def suggestions(settings: ScoringSettings) -> tuple[int, ...]:
-    """The suggested action's index for each of the 30 triples, in their order."""
+    """Return the suggested action's index for each of the 30 triples, in their order."""
     return tuple(reduce(settings, triple).action for triple in TRIPLES)
 
 
 def view(triple: Triple) -> TripleView:
-    """The triple as it travels."""
+    """Return the triple as messages carry it."""
     return TripleView(capacity=triple.capacity, gaze=triple.gaze, awareness=triple.awareness)

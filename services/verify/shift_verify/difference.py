@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple, NoReturn
 
 from shift_schemas.errors import shorten
-from shift_schemas.keys import OWNER_OF
 from shift_schemas.messages import Config, Fact
+from shift_schemas.registry import OWNER_OF
 from shift_study.loading import study_data, study_from_json
 
 PRECISION = 1e-12

@@ -16,6 +16,7 @@ from shift_monitor import core as monitor
 from shift_monitor.gaze_input import Earlier, GazeInput
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import ShiftError
+from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import (
     Fact,
     Fixation,
@@ -171,7 +172,7 @@ class MonitorRefold(Refold):
 
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """See :class:`Refold`."""
-        return monitor.step(state, event, now, late=True)
+        return monitor.step(state, event, now, timed_out=True)
 
     def input_of(self, group: list[Placed]) -> object | None:
         """Gaze is its own input; of the others exactly one is further than before."""
@@ -225,7 +226,7 @@ class LearnerRefold(Refold):
 
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """See :class:`Refold`."""
-        return learner.step(state, event, now, late=True)  # type: ignore[arg-type]
+        return learner.step(state, event, now, timed_out=True)  # type: ignore[arg-type]
 
     def input_of(self, group: list[Placed]) -> object | None:
         """A performance is its own input; else a configuration, a decision or the session's end."""
@@ -238,7 +239,7 @@ class LearnerRefold(Refold):
         for subject, before in (("config", config), ("decision", self.state.decisions)):
             if getattr(last.fact.seen, subject) > before:
                 return self.inputs.get(subject, before + 1, last)
-        if self.inputs.ending is None or self.state.phase != "live":
+        if self.inputs.ending is None or not accepts_input(self.state.phase):
             _came_from_nothing(last, self.inputs.complete)
         return self.inputs.ending
 
@@ -248,7 +249,7 @@ class LearnerRefold(Refold):
         for subject, before in (("config", config), ("decision", self.state.decisions)):
             for n in range(before + 1, self.inputs.last(subject) + 1):
                 yield self.inputs.numbered[subject][n]
-        if self.inputs.ending is not None and self.state.phase == "live":
+        if self.inputs.ending is not None and accepts_input(self.state.phase):
             yield self.inputs.ending
 
     def lost(self, following: Fact) -> str:

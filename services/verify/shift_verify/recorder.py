@@ -15,6 +15,7 @@ from shift_recorder.core import RecorderState, ended, step
 from shift_recording.mcap.records import Attachment
 from shift_recording.provenance import STUDY, attachments_of, metadata_of
 from shift_schemas.errors import ShiftError
+from shift_schemas.lifecycle import accepts_input, has_ended
 from shift_schemas.messages import (
     END_ID,
     START_ID,
@@ -83,11 +84,11 @@ class Rerecord:
         version = self.state.config.version if self.state else 0
         if version < max([1, self.claimed, *self.versions]) and version + 1 not in self.versions:
             return "config"
-        live = self.state is not None and self.state.fact.state == "live"
-        return "session" if live and isinstance(following, Session) and following.state == "ended" else "marker"
+        live = self.state is not None and accepts_input(self.state.fact.state)
+        return "session" if live and isinstance(following, Session) and has_ended(following.state) else "marker"
 
     def _begins(self, placed: Placed) -> None:
-        if not isinstance(placed.fact, Session) or placed.fact.state != "live":
+        if not isinstance(placed.fact, Session) or not accepts_input(placed.fact.state):
             differ(placed, "", placed.fact.subject, "session", "a session begins with its session")
         self.start, self._place = placed.fact, placed.place
 
@@ -116,7 +117,7 @@ class Rerecord:
     def _next(self, state: RecorderState, placed: Placed) -> Fact:
         fact, now = placed.fact, placed.fact.stamp
         match fact:
-            case Session(state="ended"):
+            case Session() if has_ended(fact.state):
                 if state.fact.format == 1:  # each attempt to finish had a time of its own then
                     state = replace(state, fact=state.fact.model_copy(update={"stamp": now}))
                 self.state = replace(state, fact=ended(state))

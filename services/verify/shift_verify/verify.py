@@ -21,10 +21,11 @@ from shift_recording.mcap.reader import RecordedMessage, Recording, fact_of
 from shift_recording.mcap.writer import CONFIG_METADATA
 from shift_recording.provenance import STUDY
 from shift_schemas.errors import DamagedRecording, MalformedMessage, ShiftError, shorten
-from shift_schemas.keys import OWNER_OF, OWNERS, SUBJECTS
+from shift_schemas.lifecycle import has_ended, is_ending
 from shift_schemas.messages import Config, Fact, Observation, Session
+from shift_schemas.registry import OWNER_OF, OWNERS, SUBJECTS
 
-from shift_verify.decider import Redecide
+from shift_verify.decider import decider_verification
 from shift_verify.difference import Difference, Differs, NotRecorded, Placed, differ, name_of
 from shift_verify.monitor_learner import Inputs, LearnerRefold, MonitorRefold
 from shift_verify.recorder import LAST, Rerecord, check_front
@@ -162,7 +163,7 @@ class _Verification:
             why = "it does not even begin as a recording does, so there is nothing to verify"
             raise Differs(0, Difference("file", 0, "", None, None, f"{self.recording.path.name}: {why}"))
         last = [p.fact for p in self.owners["recorder"].facts if isinstance(p.fact, Session)]
-        ended = bool(last) and isinstance(last[-1], Session) and last[-1].state == "ended"
+        ended = bool(last) and isinstance(last[-1], Session) and has_ended(last[-1].state)
         if not report.complete and CONFIG_METADATA in self.recording.metadata:
             why = f"it is not whole: {report.reason}"  # a finished file takes its place whole
             raise Differs(0, Difference("file", 0, "", None, None, f"{self.recording.path.name}: {why}"))
@@ -215,7 +216,7 @@ class _Verification:
         monitor = self._guarded("monitor", MonitorRefold(inputs))
         decider = None
         if self._begins("decider"):
-            fold = Redecide(inputs, self._unbroken("decider"), self._following("decider"))
+            fold = decider_verification(inputs, self._unbroken("decider"), self._following("decider"))
             decider = self._guarded("decider", fold)
         unbroken = self.owners["monitor"].unbroken
         for i, placed in enumerate(self._monitored()):
@@ -311,7 +312,7 @@ def _note(inputs: Inputs, fact: Fact) -> None:
     """Keep a fact that others take in, and what its owner says that it has seen."""
     if (name := NUMBER.get(fact.subject)) is not None:
         inputs.numbered[fact.subject][getattr(fact, name)] = fact
-    if isinstance(fact, Session) and fact.state == "ending":
+    if isinstance(fact, Session) and is_ending(fact.state):
         inputs.ending = fact
     for subject in ("decision", "performance"):
         inputs.claimed[subject] = max(inputs.claimed.get(subject, 0), getattr(fact.seen, subject))

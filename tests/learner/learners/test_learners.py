@@ -29,8 +29,8 @@ def lived(learner: Learner, where: Context, interactions: int) -> tuple[Any, lis
         triple, action = int(rng.integers(30)), int(rng.integers(where.actions))
         reward = float(rng.choice([-1, 1]) * rng.uniform(0.4, 0.7))
         taken = Taken(n, triple, where.suggestions[triple], action, 1.0)
-        memory = learner.decided(where, memory, taken)
-        memory = learner.rewarded(where, memory, taken, reward, None)
+        memory = learner.on_decision(where, memory, taken)
+        memory = learner.on_reward(where, memory, taken, reward, None)
         seen.append((triple, action, reward))
     return memory, seen
 
@@ -68,7 +68,7 @@ def test_a_function_of_a_learner_leaves_the_old_memory_standing(name: str) -> No
     memory, _ = lived(learner, where, 10)
     before = json.dumps(learner.dump(memory))
     taken = Taken(11, 7, where.suggestions[7], 2, 0.5)
-    learner.rewarded(where, learner.decided(where, memory, taken), taken, 0.4, None)
+    learner.on_reward(where, learner.on_decision(where, memory, taken), taken, 0.4, None)
     assert json.dumps(learner.dump(memory)) == before
 
 

@@ -1,4 +1,4 @@
-"""The planner's claims about itself: what it believes, how it plans, what it remembers."""
+"""The planner: its beliefs, its look-ahead and its memory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import pytest
 from shift_learner.learner import Context, Taken
 from shift_learner.learners.planner import Memory, Planner
 from shift_learner.learners.planning import beliefs as b
-from shift_learner.learners.planning.lookahead import SAME_TASK, ahead, battery_of
+from shift_learner.learners.planning.capacity_model import capacity_model_of
+from shift_learner.learners.planning.lookahead import SAME_TASK, outcome_values
 from shift_learner.learners.planning.plausible import plausible_people
 from shift_model.vocabulary import TRIPLES
 from shift_study.study import Study
@@ -27,8 +28,8 @@ def lived(context: Context, interactions: int, seed: int = 1) -> Memory:
         triple = int(rng.integers(30))
         action = int(rng.integers(context.actions))
         taken = Taken(n, triple, context.suggestions[triple], action, 1.0)
-        memory = PLANNER.decided(context, memory, taken)
-        memory = PLANNER.rewarded(context, memory, taken, float(rng.choice([-0.5, 0.5])), None)
+        memory = PLANNER.on_decision(context, memory, taken)
+        memory = PLANNER.on_reward(context, memory, taken, float(rng.choice([-0.5, 0.5])), None)
     return memory
 
 
@@ -98,8 +99,8 @@ def test_repeated_failures_turn_it_away_from_a_suggestion() -> None:
     assert CONTEXT.suggestions[triple] == 0
     for n in range(1, 8):
         taken = Taken(n, triple, 0, 0, 1.0)
-        memory = PLANNER.decided(CONTEXT, memory, taken)
-        memory = PLANNER.rewarded(CONTEXT, memory, taken, -0.5, None)
+        memory = PLANNER.on_decision(CONTEXT, memory, taken)
+        memory = PLANNER.on_reward(CONTEXT, memory, taken, -0.5, None)
     assert PLANNER.row(CONTEXT, memory, triple).probabilities[0] == 0
 
 
@@ -107,7 +108,7 @@ def test_repeated_failures_turn_it_away_from_a_suggestion() -> None:
 
 
 def naive_beliefs(seen: list[tuple[int, int, bool]]) -> np.ndarray:
-    """The posterior over preferences by Bayes' rule in plain loops, with the share given back each time."""
+    """Return the posterior over preferences by Bayes' rule in plain loops, with the share returned each time."""
     people = plausible_people(CONTEXT.study.scoring, CONTEXT.suggestions)
     change = CONTEXT.study.learner.change_probability
     prior = people.preferences.prior
@@ -124,9 +125,9 @@ def test_the_posterior_over_preferences_is_bayes_rule() -> None:
     people = plausible_people(CONTEXT.study.scoring, CONTEXT.suggestions)
     prior = b.priors(people, CONTEXT.study.learner)
     seen = [(int(RNG.integers(30)), int(RNG.integers(6)), bool(RNG.integers(2))) for _ in range(12)]
-    found = b.started(prior, 1)
+    found = b.initial(prior, 1)
     for triple, action, success in seen:
-        found = b.told(found, np.array([triple]), np.array([action]), np.array([success]))
+        found = b.update(found, np.array([triple]), np.array([action]), np.array([success]))
     np.testing.assert_allclose(found.preferences[0], naive_beliefs(seen), rtol=1e-9)
     for weights in (*found.columns, found.preferences, found.experts):
         np.testing.assert_allclose(weights.sum(axis=1), 1.0)
@@ -142,14 +143,14 @@ def test_columns_suit_what_the_scoring_system_would_suggest_with_those_entries_f
     assert people.columns[strategy].flips[0] == 0
 
 
-# --- the look ahead ---
+# --- the look-ahead ---
 
 
-def naive_ahead(
-    chance: np.ndarray, turns: np.ndarray, share: float, depth: int, discount: float
+def naive_values(
+    chance: np.ndarray, transitions: np.ndarray, share: float, depth: int, discount: float
 ) -> dict[object, float]:
-    """The value of a state (capacity index, previous, gaze, awareness 0 failure or 1 success), by recursion."""
-    battery = battery_of(CONTEXT.study)
+    """Return the value of each state (capacity, previous, gaze, awareness: 0 failure, 1 success), by recursion."""
+    model = capacity_model_of(CONTEXT.study)
     awareness = (1, 4)
 
     def expected(level: int, action: int, gaze: int, outcome: int, left: int) -> float:
@@ -158,14 +159,14 @@ def naive_ahead(
         total = 0.0
         for g, w in product(range(3), range(2)):
             p_w = SAME_TASK * (w == outcome) + (1 - SAME_TASK) * (share if w else 1 - share)
-            total += turns[gaze, g] * p_w * value(level, action, g, w, left)
+            total += transitions[gaze, g] * p_w * value(level, action, g, w, left)
         return total
 
     def value(level: int, previous: int, gaze: int, w: int, left: int) -> float:
         best = -np.inf
         for a in range(6):
-            after = battery.repeated[level] if a == previous else battery.executed[a, level]
-            p = chance[a, battery.high[level], gaze, awareness[w]]
+            after = model.repeated[level] if a == previous else model.executed[a, level]
+            p = chance[a, model.high[level], gaze, awareness[w]]
             won = 1 + discount * expected(after, a, gaze, 1, left - 1)
             lost = -1 + discount * expected(after, a, gaze, 0, left - 1)
             best = max(best, p * won + (1 - p) * lost)
@@ -177,15 +178,17 @@ def naive_ahead(
 
 def test_looking_ahead_is_the_expectation_that_a_recursion_finds() -> None:
     chance = RNG.random((6, 2, 3, 5))
-    turns = RNG.dirichlet(np.ones(3), 3)
-    found = ahead(battery_of(CONTEXT.study), chance[..., None], turns[..., None], np.array([0.3]), 2, 0.9)
-    for (level, action, gaze, outcome), value in naive_ahead(chance, turns, 0.3, 2, 0.9).items():
+    transitions = RNG.dirichlet(np.ones(3), 3)
+    found = outcome_values(
+        capacity_model_of(CONTEXT.study), chance[..., None], transitions[..., None], np.array([0.3]), 2, 0.9
+    )
+    for (level, action, gaze, outcome), value in naive_values(chance, transitions, 0.3, 2, 0.9).items():
         assert found[action, level, gaze, outcome, 0] == pytest.approx(value)
 
 
-def test_the_battery_has_the_values_that_capacity_can_take() -> None:
-    battery = battery_of(CONTEXT.study)
-    assert battery.values.tolist() == pytest.approx([i / 10 for i in range(11)])
-    assert battery.repeated.tolist() == [3, 4, 5, 6, 7, 8, 9, 10, 10, 10, 10]
-    assert battery.executed[2].tolist() == [0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8]
+def test_the_model_has_the_values_that_capacity_can_take() -> None:
+    model = capacity_model_of(CONTEXT.study)
+    assert model.values.tolist() == pytest.approx([i / 10 for i in range(11)])
+    assert model.repeated.tolist() == [3, 4, 5, 6, 7, 8, 9, 10, 10, 10, 10]
+    assert model.executed[2].tolist() == [0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8]
     assert len(TRIPLES) == 30

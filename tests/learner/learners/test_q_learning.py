@@ -30,7 +30,7 @@ def after(known: Context, *actions: int) -> Memory:
     """The memory after decisions for these actions."""
     memory = LEARNER.initial(known)
     for n, action in enumerate(actions, start=1):
-        memory = LEARNER.decided(known, memory, taken(0, action, n))
+        memory = LEARNER.on_decision(known, memory, taken(0, action, n))
     return memory
 
 
@@ -82,7 +82,7 @@ def test_exploring_tries_what_was_never_taken_first() -> None:
 
 def test_never_taken_is_counted_over_the_run_and_not_per_state() -> None:
     known = context()
-    memory = LEARNER.decided(known, LEARNER.initial(known), taken(3, 1))
+    memory = LEARNER.on_decision(known, LEARNER.initial(known), taken(3, 1))
     assert LEARNER.row(known, memory, 5).probabilities[1] == 0.0
 
 
@@ -121,7 +121,7 @@ def test_the_update_is_q_learning_s(history: list, rate: float, discount: float,
     visits = [[0] * 6 for _ in range(6)]
     for (state, action), reward, following in history:
         next_one = None if following is None else taken(following, 0, 2)
-        memory = LEARNER.rewarded(known, memory, taken(state, action), reward, next_one)
+        memory = LEARNER.on_reward(known, memory, taken(state, action), reward, next_one)
         target = reward + (discount * max(table[following]) if following is not None else 0)
         table[state][action] += rate * (target - table[state][action])
         visits[state][action] += 1
@@ -141,7 +141,7 @@ def test_a_memory_survives_plain_json(history: list, actions: list[int]) -> None
     known = context(discount=0.5)
     memory = after(known, *actions)
     for (state, action), reward, _ in history:
-        memory = LEARNER.rewarded(known, memory, taken(state, action), reward, None)
+        memory = LEARNER.on_reward(known, memory, taken(state, action), reward, None)
     assert LEARNER.load(known, json.loads(json.dumps(LEARNER.dump(memory)))) == memory
 
 
@@ -149,6 +149,6 @@ def test_no_function_changes_the_memory_that_it_was_given() -> None:
     known = context()
     memory = LEARNER.initial(known)
     before = json.dumps(LEARNER.dump(memory))
-    LEARNER.decided(known, memory, taken(1, 2))
-    LEARNER.rewarded(known, memory, taken(1, 2), 0.5, None)
+    LEARNER.on_decision(known, memory, taken(1, 2))
+    LEARNER.on_reward(known, memory, taken(1, 2), 0.5, None)
     assert json.dumps(LEARNER.dump(memory)) == before

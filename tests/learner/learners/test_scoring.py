@@ -18,7 +18,7 @@ def test_whatever_the_rewards_it_suggests_what_the_scoring_system_does(history: 
     visits = [[0] * 6 for _ in range(6)]
     for n, (state, action, reward) in enumerate(history, start=1):
         taken = Taken(n, 0, state, action, 1.0)
-        memory = LEARNER.rewarded(KNOWN, LEARNER.decided(KNOWN, memory, taken), taken, reward, None)
+        memory = LEARNER.on_reward(KNOWN, LEARNER.on_decision(KNOWN, memory, taken), taken, reward, None)
         visits[state][action] += 1
     for state in range(6):
         row = LEARNER.row(KNOWN, memory, state)

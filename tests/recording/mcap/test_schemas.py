@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 from shift_recording.mcap.schemas import known_names, recorded_json, schema_of, subject_schemas
-from shift_schemas.keys import SUBJECTS
-from shift_schemas.messages import FACTS, Fact, Seen
+from shift_schemas.messages import Fact, Seen
+from shift_schemas.registry import FACTS, SUBJECTS
 from shift_study.study import Study
 from support.recordings import decision_fact, gaze_fact, marker_fact
 

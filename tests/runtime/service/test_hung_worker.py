@@ -34,10 +34,10 @@ class Hanging(threading.Thread):
         self.let_go = threading.Event()
         self.up = threading.Event()
 
-    def step(self, state: Notes | None, message: Any, now: Stamp, late: bool = False) -> Step[Notes]:
+    def step(self, state: Notes | None, message: Any, now: Stamp, timed_out: bool = False) -> Step[Notes]:
         if isinstance(message, Decide) and message.task == "hang":
             self.let_go.wait(60)
-        return CORE.step(state or Notes("s1", 1), message, now, late)
+        return CORE.step(state or Notes("s1", 1), message, now, timed_out)
 
     def run(self) -> None:
         asyncio.run(self._run())

@@ -11,7 +11,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shift_runtime import reader as reader_module
-from shift_runtime.service import loop as worker_module
+from shift_runtime.service import disk_alarm as disk_alarm_module
+from shift_runtime.service import transaction as transaction_module
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import Conflict, MalformedMessage, ShiftError, Unavailable, UnknownThing
 from shift_schemas.messages import Decide, Decision, Gaze, Marker, OutboxPage, OutboxQuery, Seen
@@ -43,7 +44,7 @@ async def test_a_command_is_committed_published_and_answered_with_its_sequence(l
     answer = await live.decide("d1")
     assert answer.owner == "decider"
     assert answer.seq == 1
-    assert answer.result == {"n": 1, "fixations": 0, "late": False}
+    assert answer.result == {"n": 1, "fixations": 0, "timed_out": False}
     assert not answer.repeat
     assert live.outbox() == [(1, "decision d1")]
     await until(lambda: live.published)
@@ -131,21 +132,21 @@ async def test_a_command_waits_for_the_facts_that_it_needs(live: Rig) -> None:
     asked = asyncio.create_task(live.decide("d1", "after-2"))
     live.monitor.put_out(fixation(1), fixation(2))
     answer = await asked
-    assert answer.result == {"n": 3, "fixations": 2, "late": False}
+    assert answer.result == {"n": 3, "fixations": 2, "timed_out": False}
 
 
 @RUNNING
 async def test_without_a_hint_it_asks_the_owner_again_while_it_waits(live: Rig) -> None:
     asked = asyncio.create_task(live.decide("d1", "after-2"))
     live.monitor.put_out(fixation(1), fixation(2), hint=False)
-    assert (await asked).result["late"] is False
+    assert (await asked).result["timed_out"] is False
 
 
 @RUNNING
 async def test_it_gives_up_in_time_and_says_that_it_is_late(live: Rig) -> None:
     live.monitor.put_out(fixation(1))
     answer = await live.decide("d1", "after-2")
-    assert answer.result == {"n": 2, "fixations": 1, "late": True}
+    assert answer.result == {"n": 2, "fixations": 1, "timed_out": True}
     live.monitor.put_out(fixation(2))
     await until(lambda: len(live.outbox()) == 3)
     assert (await live.decide("d1", "after-2")).result == answer.result
@@ -169,7 +170,7 @@ async def test_one_session_s_waiting_holds_up_no_other(live: Rig) -> None:
     await asyncio.sleep(0)
     assert (await live.decide("d1", name="s2")).result["n"] == 1
     assert not waiting.done()
-    assert (await waiting).result["late"] is True
+    assert (await waiting).result["timed_out"] is True
 
 
 # --- unknown ---
@@ -266,7 +267,7 @@ async def test_a_session_that_ended_is_closed_and_read_no_more(live: Rig) -> Non
     live.monitor.put_out(fixation(1))
     await asyncio.sleep(0.05)
     assert live.outbox() == [(1, "decision d1")]
-    assert live.worker.states.get("s1") is None
+    assert live.worker.states.loaded("s1") is None
     assert (await live.decide("d1")).repeat
     await live.crash()
     live.start()
@@ -280,7 +281,7 @@ async def test_a_session_that_ended_is_closed_and_read_no_more(live: Rig) -> Non
 @pytest.fixture
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """What can wait for a commit waits for good."""
-    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 60.0)
+    monkeypatch.setattr(transaction_module, "COMMIT_WITHIN_S", 60.0)
 
 
 async def read_configuration(rig: Rig, version: int) -> None:
@@ -309,7 +310,7 @@ async def test_what_puts_nothing_out_is_committed_soon_and_only_once(
     live: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await live.decide("d1")
-    monkeypatch.setattr(worker_module, "COMMIT_WITHIN_S", 0.02)
+    monkeypatch.setattr(transaction_module, "COMMIT_WITHIN_S", 0.02)
     before = live.journal.commits
     await read_configuration(live, 2)
     await until(lambda: live.committed().config == 2)
@@ -397,7 +398,7 @@ async def test_facts_of_a_refused_commit_are_read_again_once_there_is_room(
 async def test_health_says_that_the_disk_refuses_and_recovers_without_being_asked_for_anything(
     live: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(worker_module, "CHECK_EVERY_S", 0.02)
+    monkeypatch.setattr(disk_alarm_module, "CHECK_EVERY_S", 0.02)
     live.journal.full = True
     with pytest.raises(Unavailable):
         await live.decide("d1")
@@ -569,6 +570,6 @@ def test_facts_and_commands_are_applied_once_whatever_happens(
         await rig.crash()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(worker_module, "CHECK_EVERY_S", 0.01)
+        patch.setattr(disk_alarm_module, "CHECK_EVERY_S", 0.01)
         patch.setattr(reader_module, "PULL_EVERY_S", 0.01)
         asyncio.run(test())

@@ -1,4 +1,4 @@
-"""The registry: a learner's name in the study file, and the learner. One file each."""
+"""The registry of learners. To add a learner, write its file here and add its class to ``LEARNERS``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LEARNERS: dict[str, Learner] = {
 
 
 def learner_named(name: str) -> Learner:
-    """The learner of that name; :class:`InvalidStudy` names those that there are."""
+    """Return the learner of this name; raise :class:`InvalidStudy`, which lists the learners, if there is none."""
     if name not in LEARNERS:
         meant = did_you_mean(name, LEARNERS)
         raise InvalidStudy(f"learner.name: there is no learner {name!r}; write one of {', '.join(LEARNERS)}{meant}")

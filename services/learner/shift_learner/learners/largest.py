@@ -1,8 +1,8 @@
 """The probability that each of several independent samples is the largest, by quadrature. Pure, deterministic.
 
-P(i) = integral of f_i(x) x product over j != i of F_j(x), the exact choice probabilities of Thompson sampling.
-Densities are given on one grid; distribution functions are their running integrals (trapezoid rule). The row is
-normalised, and the decider draws from that very row, so what is published is what is done.
+P(i) = integral of f_i(x) x product over j != i of F_j(x): the exact choice probabilities of Thompson sampling.
+All densities are on one grid; the distribution functions are their running integrals (trapezoid rule). The row is
+normalised, and the decider draws from this row, so the published probabilities are the actual ones.
 """
 
 from __future__ import annotations
@@ -14,7 +14,10 @@ Floats = NDArray[np.float64]
 
 
 def chances_of_largest(densities: Floats) -> list[float]:
-    """[arms, points] on an even grid, each up to a factor, to [arms] that sum to 1."""
+    """Return the probability of each arm, [arms], summing to 1.
+
+    ``densities`` is [arms, points] on an even grid; each row may have any factor.
+    """
     steps = (densities[:, 1:] + densities[:, :-1]) / 2
     below = np.concatenate([np.zeros((len(densities), 1)), np.cumsum(steps, axis=1)], axis=1)
     below /= below[:, -1:]
@@ -25,7 +28,7 @@ def chances_of_largest(densities: Floats) -> list[float]:
 
 
 def _product_of_others(below: Floats) -> Floats:
-    """For each arm, the product of all other arms' rows; never by division, for rows begin with 0."""
+    """Return for each arm the product of all other arms' rows, without division, since rows begin with 0."""
     product = np.ones_like(below)
     np.cumprod(below[:-1], axis=0, out=product[1:])
     after = np.cumprod(below[:0:-1], axis=0)[::-1]

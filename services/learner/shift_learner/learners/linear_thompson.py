@@ -1,11 +1,11 @@
 """Linear Thompson sampling: Bayesian linear regression of the reward for each action (Agrawal & Goyal 2013).
 
-An action's reward is a sum of weights: one for each of the triple's three categories (ten in all), and one for
-being the suggested action; so what is learned in one triple tells about those that share a category, and 100
-interactions go further than on 30 triples by themselves. Weights have the prior N(0, 1 / ``prior_strength``), that
-of being suggested the mean ``prior_value`` where the scoring system is the prior; rewards lie around the sum with the
-standard deviation ``noise``. Actions have weights of their own (the disjoint model of Li et al. 2010), so their
-samples are independent and the probability of the largest is an integral over one variable.
+The reward of an action is a sum of weights: one for each of the triple's three categories (ten in all), and one for
+being the suggested action. So a result at one triple is also evidence for the triples that share a category, and 100
+interactions teach more than on 30 separate triples. Weights have the prior N(0, 1 / ``prior_strength``); with the
+scoring prior, the weight of being suggested has the mean ``prior_value``. Rewards have the standard deviation
+``noise`` around the sum. Each action has its own weights (the disjoint model of Li et al. 2010), so the samples of
+actions are independent and the probability of the largest one is an integral over one variable.
 """
 
 from __future__ import annotations
@@ -23,17 +23,18 @@ from shift_learner.learners.largest import chances_of_largest
 
 Floats = NDArray[np.float64]
 FEATURES = 11
-"""Two classes of capacity, three of gaze, five of awareness, and being suggested."""
+"""Two classes of capacity, three of gaze, five of awareness, and being the suggested action."""
 POINTS = 1025
-"""Chosen: of the grid over all means +- REACH standard deviations; a test compares with 400,000 samples."""
+"""Chosen: the points of the grid; a test compares the result with 400,000 samples."""
 REACH = 7.0
+"""Chosen: the grid covers this many standard deviations around all means."""
 LEAST_PRECISION = 1e-3
-"""Of the prior, where ``prior_strength`` is 0: a prior that says next to nothing."""
+"""Chosen: the precision of the prior if ``prior_strength`` is 0, an almost flat prior."""
 
 
 @dataclass(frozen=True)
 class Memory:
-    """What the data add to the prior, per action; reported visits per triple. Arrays are never written to."""
+    """The sums of the data for each action, and the reported visits of each triple. Arrays are never written to."""
 
     precision: Floats
     """[actions, FEATURES, FEATURES]: sum of x x'."""
@@ -44,24 +45,24 @@ class Memory:
 
 
 class LinearThompson:
-    """See the module."""
+    """A Thompson sampler with a linear model of the reward."""
 
     name = "linear-thompson"
     on_triples = True
 
     def initial(self, context: Context) -> Memory:
-        """Nothing seen."""
+        """Return a memory without data."""
         n = context.actions
         return Memory(np.zeros((n, FEATURES, FEATURES)), np.zeros((n, FEATURES)), np.zeros((len(TRIPLES), n), np.int64))
 
-    def decided(self, context: Context, memory: Memory, taken: Taken) -> Memory:
-        """Nothing changes."""
+    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+        """Return the memory unchanged."""
         return memory
 
-    def rewarded(
+    def on_reward(
         self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
     ) -> Memory:
-        """One observation more for the action's regression."""
+        """Add one observation to the action's regression."""
         x = features(context, taken.triple)[taken.action]
         precision, moment, visits = memory.precision.copy(), memory.moment.copy(), memory.visits.copy()
         precision[taken.action] += np.outer(x, x)
@@ -70,29 +71,29 @@ class LinearThompson:
         return replace(memory, precision=precision, moment=moment, visits=visits)
 
     def needs_following(self, context: Context) -> bool:
-        """Never: a bandit."""
+        """Return False: a bandit needs no next state."""
         return False
 
     def row(self, context: Context, memory: Memory, state: int) -> Row:
-        """Each action's probability of the largest sample; the values are the posteriors' means."""
+        """Return the probability that each action's sample is the largest; the values are the posterior means."""
         means, deviations = posterior(context, memory, state)
         row = chances(tuple(means.tolist()), tuple(deviations.tolist()))
         return Row(list(row), means.tolist(), memory.visits[state].tolist())
 
     def epsilon(self, context: Context, memory: Memory) -> None:
-        """It explores by its doubt."""
+        """Return None: exploration comes from posterior sampling, without a rate."""
 
     def dump(self, memory: Memory) -> Any:
-        """Plain lists; floats keep every digit."""
+        """Return plain lists; floats keep every digit."""
         return [memory.precision.tolist(), memory.moment.tolist(), memory.visits.tolist()]
 
     def load(self, context: Context, data: Any) -> Memory:
-        """Arrays again."""
+        """Return the memory with its arrays."""
         return Memory(np.array(data[0]), np.array(data[1]), np.array(data[2], np.int64))
 
 
 def features(context: Context, triple: int) -> Floats:
-    """What each action's regression sees at a triple, [actions, FEATURES]: its three categories, and the suggestion."""
+    """Return the features of each action at a triple, [actions, FEATURES]: three categories and the suggestion."""
     x = np.zeros((context.actions, FEATURES))
     x[:, [triple // 15, 2 + triple // 5 % 3, 5 + triple % 5]] = 1.0
     x[context.suggestions[triple], -1] = 1.0
@@ -100,7 +101,7 @@ def features(context: Context, triple: int) -> Floats:
 
 
 def posterior(context: Context, memory: Memory, triple: int) -> tuple[Floats, Floats]:
-    """Mean and standard deviation of each action's expected reward at a triple, [actions] each."""
+    """Return mean and standard deviation of each action's expected reward at a triple, [actions] each."""
     settings = context.study.learner
     strength = max(settings.prior_strength, LEAST_PRECISION)
     mean = np.zeros(FEATURES)
@@ -115,7 +116,7 @@ def posterior(context: Context, memory: Memory, triple: int) -> tuple[Floats, Fl
 
 @lru_cache(maxsize=4096)
 def chances(means: tuple[float, ...], deviations: tuple[float, ...]) -> tuple[float, ...]:
-    """Probability that each of independent normal samples is the largest."""
+    """Return the probability that each of several independent normal samples is the largest."""
     mean, deviation = np.array(means), np.array(deviations)
     x = np.linspace((mean - REACH * deviation).min(), (mean + REACH * deviation).max(), POINTS)
     return tuple(chances_of_largest(np.exp(-0.5 * ((x - mean[:, None]) / deviation[:, None]) ** 2)))

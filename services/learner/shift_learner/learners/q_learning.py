@@ -1,10 +1,10 @@
 """The paper's learner: Q-learning with decayed epsilon-greedy that tries untaken actions first.
 
-Paper, section III-D (Watkins & Dayan 1992; Tokic 2010; Castro-Gonzalez et al. 2014). Target
-r + gamma x max Q(s'); Q0 = ``prior_value`` on the state's own action where the scoring system is the
-prior, else 0. Epsilon falls linearly to 0 over the planned interactions. An exploring step picks
-uniformly among the actions never taken in this run, and once there is none, among all. Greedy ties go
-to the first action. *Taken* means decided, overrides included; visits count reported decisions.
+Paper, section III-D (Watkins & Dayan 1992; Tokic 2010; Castro-Gonzalez et al. 2014). The target is r + gamma x max
+Q(s'). With the scoring prior, Q0 is ``prior_value`` on the state's own action; every other Q0 is 0. Epsilon falls
+linearly to 0 over the planned interactions. An exploring step is uniform among the actions never taken in this run,
+or among all actions once each was taken. Greedy ties go to the first action. An action is *taken* when it is decided,
+overrides included; visits count reported decisions.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from shift_learner.learner import Context, Row, Taken
 
 @dataclass(frozen=True)
 class Memory:
-    """The Q-table and what exploration depends on."""
+    """The Q-table, and the counts that exploration depends on."""
 
     values: tuple[tuple[float, ...], ...]
     visits: tuple[tuple[int, ...], ...]
@@ -26,13 +26,13 @@ class Memory:
 
 
 class QLearning:
-    """See the module."""
+    """The paper's Q-learning."""
 
     name = "q-learning"
     on_triples = False
 
     def initial(self, context: Context) -> Memory:
-        """Q0, nothing taken."""
+        """Return Q0, with no action taken."""
         settings = context.study.learner
         prior = settings.prior_value if settings.scoring_prior else 0.0
         n = context.actions
@@ -42,18 +42,18 @@ class QLearning:
             taken=(False,) * n,
         )
 
-    def decided(self, context: Context, memory: Memory, taken: Taken) -> Memory:
-        """The action is taken, and epsilon one decision further."""
+    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+        """Mark the action as taken and count the decision, which lowers epsilon."""
         return replace(
             memory,
             taken=tuple(t or action == taken.action for action, t in enumerate(memory.taken)),
             decisions=memory.decisions + 1,
         )
 
-    def rewarded(
+    def on_reward(
         self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
     ) -> Memory:
-        """Q(s, a) moves by the learning rate towards r + gamma x max Q(s')."""
+        """Move Q(s, a) by the learning rate towards r + gamma x max Q(s')."""
         settings = context.study.learner
         state, action = taken.cognitive_state, taken.action
         row = list(memory.values[state])
@@ -70,11 +70,11 @@ class QLearning:
         )
 
     def needs_following(self, context: Context) -> bool:
-        """With a discount above 0."""
+        """Return True if the discount is above 0."""
         return context.study.learner.discount > 0
 
     def row(self, context: Context, memory: Memory, state: int) -> Row:
-        """The exact distribution of the rule."""
+        """Return the exact distribution of the rule."""
         values = memory.values[state]
         epsilon = self.epsilon(context, memory)
         candidates = [a for a, taken in enumerate(memory.taken) if not taken] or list(range(context.actions))
@@ -85,15 +85,15 @@ class QLearning:
         return Row(probabilities, list(values), list(memory.visits[state]))
 
     def epsilon(self, context: Context, memory: Memory) -> float:
-        """Linear from ``epsilon`` to 0 over the planned interactions, by the decisions made before."""
+        """Return epsilon, which falls linearly to 0 over the planned interactions, by the decisions made so far."""
         study = context.study
         return study.learner.epsilon * max(0.0, 1.0 - memory.decisions / study.interactions)
 
     def dump(self, memory: Memory) -> Any:
-        """Plain lists."""
+        """Return plain lists."""
         return [memory.values, memory.visits, memory.taken, memory.decisions]
 
     def load(self, context: Context, data: Any) -> Memory:
-        """Tuples again."""
+        """Return the memory with its tuples."""
         values, visits, taken, decisions = data
         return Memory(tuple(map(tuple, values)), tuple(map(tuple, visits)), tuple(taken), decisions)

@@ -1,6 +1,6 @@
-"""Scoring only: the suggestion of the scoring system, always. It counts what it sees and learns nothing.
+"""Scoring only: always the suggestion of the scoring system. It counts visits and learns nothing.
 
-The baseline of the paper's claim (each cognitive state *is* its action, section III-C).
+It is the baseline of the paper's claim (each cognitive state *is* its action, section III-C).
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ Visits = tuple[tuple[int, ...], ...]
 
 
 class Scoring:
-    """See the module."""
+    """The baseline that always follows the scoring system."""
 
     name = "scoring"
     on_triples = False
 
     def initial(self, context: Context) -> Visits:
-        """No visits yet."""
+        """Return zero visits."""
         return tuple((0,) * context.actions for _ in context.cognitive_states)
 
-    def decided(self, context: Context, memory: Visits, taken: Taken) -> Visits:
-        """Nothing changes."""
+    def on_decision(self, context: Context, memory: Visits, taken: Taken) -> Visits:
+        """Return the memory unchanged."""
         return memory
 
-    def rewarded(
+    def on_reward(
         self, context: Context, memory: Visits, taken: Taken, reward: float, following: Taken | None
     ) -> Visits:
         """Count the visit."""
@@ -35,21 +35,21 @@ class Scoring:
         return (*memory[: taken.cognitive_state], counted, *memory[taken.cognitive_state + 1 :])
 
     def needs_following(self, context: Context) -> bool:
-        """Never."""
+        """Return False: nothing is learned."""
         return False
 
     def row(self, context: Context, memory: Visits, state: int) -> Row:
-        """All probability on the state's own action."""
+        """Put all probability on the state's own action."""
         suggested = [float(action == state) for action in range(context.actions)]
         return Row(suggested, list(suggested), list(memory[state]))
 
     def epsilon(self, context: Context, memory: Visits) -> None:
-        """It does not explore."""
+        """Return None: there is no exploration."""
 
     def dump(self, memory: Visits) -> Any:
-        """Lists of visits."""
+        """Return the visits."""
         return memory
 
     def load(self, context: Context, data: Any) -> Visits:
-        """Tuples again."""
+        """Return the visits as tuples."""
         return tuple(tuple(row) for row in data)

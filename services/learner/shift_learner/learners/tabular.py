@@ -1,6 +1,6 @@
-"""What bandits on the 30 triples share: how often each action was taken there, and the sum of its rewards.
+"""The common part of bandits on the 30 triples: visits and the sum of rewards of each action.
 
-A bandit on triples is this and a :meth:`Tabular.row`; ``docs/learners.md`` adds one in twenty lines.
+A bandit adds its own :meth:`Tabular.row`; ``docs/learners.md`` adds one in twenty lines.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ Sums = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class Memory:
-    """Reported visits and their sum of rewards, [30][actions], and the decisions made."""
+    """Reported visits and their sums of rewards, [30][actions], and the number of decisions."""
 
     visits: Counts
     rewards: Sums
@@ -26,24 +26,24 @@ class Memory:
 
 
 class Tabular:
-    """A learner whose memory is counts and sums; it publishes a row for each triple."""
+    """A learner whose memory is counts and sums, with a row for each triple."""
 
     name: str
     on_triples = True
 
     def initial(self, context: Context) -> Memory:
-        """Nothing seen."""
+        """Return a memory without visits."""
         n = context.actions
         return Memory(((0,) * n,) * len(TRIPLES), ((0.0,) * n,) * len(TRIPLES))
 
-    def decided(self, context: Context, memory: Memory, taken: Taken) -> Memory:
-        """One decision more."""
+    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+        """Count the decision."""
         return replace(memory, decisions=memory.decisions + 1)
 
-    def rewarded(
+    def on_reward(
         self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
     ) -> Memory:
-        """One visit more, and its reward."""
+        """Count the visit and add its reward."""
         at, action = taken.triple, taken.action
         visits, rewards = list(memory.visits[at]), list(memory.rewards[at])
         visits[action] += 1
@@ -55,35 +55,35 @@ class Tabular:
         )
 
     def needs_following(self, context: Context) -> bool:
-        """Never: a bandit."""
+        """Return False: a bandit needs no next state."""
         return False
 
     def row(self, context: Context, memory: Memory, state: int) -> Row:
-        """The policy at a triple."""
+        """Return the policy at a triple."""
         raise NotImplementedError
 
     def epsilon(self, context: Context, memory: Memory) -> float | None:
-        """None, unless it has one."""
+        """Return None; a subclass with an exploration rate overrides this."""
         return None
 
     def dump(self, memory: Memory) -> Any:
-        """Plain lists."""
+        """Return plain lists."""
         return [memory.visits, memory.rewards, memory.decisions]
 
     def load(self, context: Context, data: Any) -> Memory:
-        """Tuples again."""
+        """Return the memory with its tuples."""
         visits, rewards, decisions = data
         return Memory(tuple(map(tuple, visits)), tuple(map(tuple, rewards)), decisions)
 
 
 def prior_values(context: Context, triple: int) -> list[float]:
-    """``prior_value`` on the suggested action, 0 elsewhere and without the scoring prior."""
+    """Return ``prior_value`` for the suggested action and 0 for the others, or all 0 without the scoring prior."""
     settings = context.study.learner
     prior = settings.prior_value if settings.scoring_prior else 0.0
     return [prior if action == context.suggestions[triple] else 0.0 for action in range(context.actions)]
 
 
 def greedy(values: list[float]) -> list[float]:
-    """All probability on the first of the largest."""
+    """Return all probability on the first of the largest values."""
     best = values.index(max(values))
     return [float(action == best) for action in range(len(values))]

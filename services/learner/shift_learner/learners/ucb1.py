@@ -1,8 +1,8 @@
 """UCB1 on the triples (Auer, Cesa-Bianchi & Fischer 2002).
 
-The action with the largest mean + c x sqrt(2 ln n / visits), n being the visits of the triple; rewards are brought
-from [-scale, scale] to the 0..1 that the bound is made for. An action without visits comes first: the suggested one
-where the scoring system is the prior, then in their order. Deterministic, so a row is one action's.
+It takes the action with the largest mean + c x sqrt(2 ln n / visits), where n is the number of visits of the triple.
+Rewards are mapped from [-scale, scale] to 0..1, the range of the bound. Actions without visits come first: with the
+scoring prior the suggested one, then the others in their order. The rule is deterministic.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from shift_learner.learner import Context, Row
 from shift_learner.learners.tabular import Memory, Tabular, greedy, prior_values
 
 UNTRIED = 1e6
-"""The value of an action without visits, instead of infinity, which JSON cannot say; the prior comes on top."""
+"""The value of an action without visits, plus its prior; JSON has no infinity."""
 
 
 class Ucb1(Tabular):
-    """See the module."""
+    """UCB1 on the 30 triples."""
 
     name = "ucb1"
 
     def row(self, context: Context, memory: Memory, state: int) -> Row:
-        """All probability on the largest upper bound."""
+        """Put all probability on the largest upper bound."""
         visits = memory.visits[state]
         scale = context.study.reward.scale or 1.0
         width = context.study.learner.exploration

@@ -18,7 +18,8 @@ from typing import NamedTuple, get_args
 
 from shift_schemas.codec import decode
 from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing, shorten
-from shift_schemas.messages import FACTS, Fact
+from shift_schemas.messages import Fact
+from shift_schemas.registry import FACTS
 
 from shift_recording.mcap import records as p
 from shift_recording.mcap.scanner import CutOff, Scan

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from shift_schemas.codec import VERSION
-from shift_schemas.keys import SUBJECTS
-from shift_schemas.messages import FACTS, Fact
+from shift_schemas.messages import Fact
+from shift_schemas.registry import FACTS, SUBJECTS
 from shift_study.study import Study
 
 Schema = dict[str, Any]

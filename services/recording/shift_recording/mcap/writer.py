@@ -12,7 +12,7 @@ from typing import Any
 
 from mcap.writer import CompressionType, Writer
 from shift_schemas.errors import MalformedMessage, TooLarge, shorten
-from shift_schemas.keys import SUBJECTS
+from shift_schemas.registry import SUBJECTS
 
 from shift_recording.durable_file import DurableFile
 from shift_recording.mcap.records import MAXIMUM_BYTES, MAXIMUM_SMALL_BYTES, Attachment

@@ -1,1 +1,1 @@
-"""What the planner is made of: plausible people, beliefs about them, and the look ahead."""
+"""The parts of the planner: plausible people, beliefs about them, the capacity model and the look-ahead."""

@@ -1,17 +1,17 @@
-"""Beliefs about one person (or one per run): who of the plausible people it is, and how probable success is.
+"""Beliefs about the person of each run: which plausible person it is, and how probable success is. Pure.
 
-Pure; arrays have a leading axis of runs, live it is 1. Three experts predict whether an action succeeds:
+Arrays have a leading axis of runs, which is 1 in a live session. Three experts predict whether an action succeeds:
 
-1. *wrong entries*: for each strategy a posterior over its 2**10 columns. An action succeeds when every strategy's
-   level suits; the strategies' posteriors are held as independent and each is updated with the others' expectation
-   (assumed density filtering, Minka 2001).
+1. *wrong entries*: for each strategy a posterior over its 2**10 columns. An action succeeds if the level of every
+   strategy suits. The posteriors of the strategies are treated as independent, and each is updated with the
+   expectation of the others (assumed density filtering, Minka 2001).
 2. *a preference*: the exact posterior over the list of preferences.
-3. *nothing known*: plain counts of what each action did at each triple, a Beta posterior that slowly forgets.
+3. *nothing known*: counts of the results of each action at each triple, a Beta posterior that slowly forgets.
 
-They are averaged by how well each has predicted (Bayesian model averaging, Hoeting et al. 1999), so that the last
-takes over where both ideas of the person are wrong.
-People change: after every result each posterior gives a small share back to its prior (fixed share, Herbster &
-Warmuth 1998), which is exact for somebody who is replaced by another with that probability.
+The experts are averaged by the quality of their predictions (Bayesian model averaging, Hoeting et al. 1999), so the
+third one prevails where both ideas of the person are wrong.
+People change: after every result each posterior returns a small share to its prior (fixed share, Herbster & Warmuth
+1998). This is exact for a person who is replaced by another one with that probability.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from shift_study.study import LearnerSettings
 from shift_learner.learners.planning.plausible import Bools, Floats, Ints, Plausible
 
 LOW, HIGH = 0.025, 0.975
-"""Chance of success where an expert of the first two says no, or yes; chosen: one in forty is chance."""
+"""Probability of success if one of the first two experts says no, or yes; chosen: one result in forty is chance."""
 EXPERTS = (0.5, 0.4, 0.1)
-"""Prior of the three; chosen on people generated around other tables (docs/learners.md)."""
+"""Prior weights of the three experts; chosen on people generated around other tables (docs/learners.md)."""
 COUNT_SUCCESS, COUNT_FAILURE = 0.3, 0.7
-"""Beta prior of counts; chosen: an action that nothing is known of mostly fails, and one trial decides."""
+"""Beta prior of the counts; chosen: an unknown action mostly fails, and one trial decides."""
 COUNT_MEMORY = 0.98
-"""What is kept of the counts at each result; chosen: half is gone after 34."""
+"""Share of the counts that is kept at each result; chosen: half is forgotten after 34 results."""
 
 
 @dataclass(frozen=True)
 class Priors:
-    """Where beliefs start, and what they give back to."""
+    """The start of all beliefs, to which each result returns a share."""
 
     plausible: Plausible
     columns: tuple[Floats, ...]
@@ -46,7 +46,7 @@ class Priors:
 
 @dataclass(frozen=True)
 class Beliefs:
-    """Posterior weights, [runs, ...] each."""
+    """The posterior weights, [runs, ...] each."""
 
     prior: Priors
     columns: tuple[Floats, ...]
@@ -57,7 +57,7 @@ class Beliefs:
 
     @cached_property
     def chances(self) -> Floats:
-        """Probability of success, [runs, 30, actions]."""
+        """The probability of success, [runs, 30, actions]."""
         people = self.prior.plausible
         suits: Floats = np.ones(())
         for s, (weights, column) in enumerate(zip(self.columns, people.columns, strict=True)):
@@ -66,11 +66,11 @@ class Beliefs:
         preferred = (self.preferences @ people.preferences.success).reshape(np.shape(suits))
         counted = _counted_chances(self.successes, self.failures).reshape(np.shape(suits))
         first, second, third = (self.experts[:, i, None, None] for i in range(3))
-        mixed: Floats = first * _noisy(suits) + second * _noisy(preferred) + third * counted
+        mixed: Floats = first * _with_noise(suits) + second * _with_noise(preferred) + third * counted
         return mixed
 
     def of(self, runs: slice) -> Beliefs:
-        """Some of the runs; all of them are the same beliefs."""
+        """Return the beliefs of some runs; for all runs, return the same object."""
         if runs.start == 0 and runs.stop >= len(self.experts):
             return self
         columns = tuple(column[runs] for column in self.columns)
@@ -79,7 +79,7 @@ class Beliefs:
 
 
 def priors(plausible: Plausible, settings: LearnerSettings) -> Priors:
-    """The priors that the settings ask for; without the scoring prior only the third expert is left."""
+    """Return the priors of these settings; without the scoring prior, only the third expert remains."""
     flip = settings.flip_probability
     columns = []
     for column in plausible.columns:
@@ -89,8 +89,8 @@ def priors(plausible: Plausible, settings: LearnerSettings) -> Priors:
     return Priors(plausible, tuple(columns), experts, settings.change_probability)
 
 
-def started(prior: Priors, runs: int) -> Beliefs:
-    """Before the first result."""
+def initial(prior: Priors, runs: int) -> Beliefs:
+    """Return the beliefs before the first result."""
     counts = np.zeros((runs, prior.plausible.preferences.success.shape[1]))
     return Beliefs(
         prior,
@@ -102,8 +102,8 @@ def started(prior: Priors, runs: int) -> Beliefs:
     )
 
 
-def told(beliefs: Beliefs, triple: Ints, action: Ints, success: Bools) -> Beliefs:
-    """After a result in each run: [runs] each."""
+def update(beliefs: Beliefs, triple: Ints, action: Ints, success: Bools) -> Beliefs:
+    """Return the beliefs after a result in each run; the arguments are [runs] each."""
     prior = beliefs.prior
     people = prior.plausible
     runs, cell = np.arange(len(triple)), triple * len(people.levels) + action
@@ -112,8 +112,8 @@ def told(beliefs: Beliefs, triple: Ints, action: Ints, success: Bools) -> Belief
     right = people.preferences.success_by_cell[cell]
     predicted = np.stack(
         [
-            _noisy(np.prod(fit, axis=0)),
-            _noisy(_dot(beliefs.preferences, right)),
+            _with_noise(np.prod(fit, axis=0)),
+            _with_noise(_dot(beliefs.preferences, right)),
             _counted_chances(beliefs.successes[runs, cell], beliefs.failures[runs, cell]),
         ],
         axis=1,
@@ -122,26 +122,29 @@ def told(beliefs: Beliefs, triple: Ints, action: Ints, success: Bools) -> Belief
     return Beliefs(
         prior,
         tuple(
-            _shared(w * _column_likelihood(s, fit, i, success), prior.columns[i], prior.change)
+            _with_share(w * _column_likelihood(s, fit, i, success), prior.columns[i], prior.change)
             for i, (w, s) in enumerate(zip(beliefs.columns, suited, strict=True))
         ),
-        _shared(beliefs.preferences * _likelihood(right, success), people.preferences.prior, prior.change),
-        _counted(beliefs.successes, (runs, cell), success),
-        _counted(beliefs.failures, (runs, cell), ~success),
-        _shared(experts, prior.experts, prior.change),
+        _with_share(beliefs.preferences * _likelihood(right, success), people.preferences.prior, prior.change),
+        _add_counts(beliefs.successes, (runs, cell), success),
+        _add_counts(beliefs.failures, (runs, cell), ~success),
+        _with_share(experts, prior.experts, prior.change),
     )
 
 
 # --- pieces ---
 
 
-def _noisy(right: Floats | float) -> Floats:
-    """Chance of success where ``right`` is the probability that the action is a right one."""
+def _with_noise(right: Floats | float) -> Floats:
+    """Return the probability of success, given the probability that the action is a right one."""
     return np.asarray(LOW + (HIGH - LOW) * right)
 
 
 def _likelihood(right: Floats, success: Bools) -> Floats:
-    """Of the result, for each hypothesis: :func:`_noisy`, or 1 less it after a failure, [runs, hypotheses]."""
+    """Return the likelihood of the result for each hypothesis, [runs, hypotheses].
+
+    It is :func:`_with_noise` after a success, and 1 minus it after a failure.
+    """
     wrong, step = _line(success)
     likelihood: Floats = right * step
     likelihood += wrong
@@ -149,13 +152,13 @@ def _likelihood(right: Floats, success: Bools) -> Floats:
 
 
 def _line(success: Bools) -> tuple[Floats, Floats]:
-    """The likelihood of the result where an action is wrong, and what being right adds, [runs, 1] each."""
+    """Return the likelihood of the result of a wrong action, and what a right one adds to it, [runs, 1] each."""
     sign = np.where(success, 1.0, -1.0)[:, None]
     return np.where(success, LOW, 1 - LOW)[:, None], sign * (HIGH - LOW)
 
 
 def _column_likelihood(suited: Floats, fit: list[Floats], own: int, success: Bools) -> Floats:
-    """Of the result, for each column of strategy ``own``, the other strategies as expected."""
+    """Return the likelihood for each column of strategy ``own``, given the expectation of the other strategies."""
     others = np.ones(len(success))
     for s, probability in enumerate(fit):
         if s != own:
@@ -171,8 +174,8 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return total
 
 
-def _shared(weights: Floats, prior: Floats, change: float) -> Floats:
-    """Normalised, and a share given back to the prior; in place."""
+def _with_share(weights: Floats, prior: Floats, change: float) -> Floats:
+    """Normalise the weights and return a share to the prior, in place."""
     weights *= (1 - change) / weights.sum(axis=1, keepdims=True)
     weights += change * prior
     return weights
@@ -182,7 +185,7 @@ def _counted_chances(successes: Floats, failures: Floats) -> Floats:
     return (successes + COUNT_SUCCESS) / (successes + failures + (COUNT_SUCCESS + COUNT_FAILURE))
 
 
-def _counted(counts: Floats, places: tuple[Ints, Ints], more: Bools) -> Floats:
+def _add_counts(counts: Floats, places: tuple[Ints, Ints], more: Bools) -> Floats:
     after = counts * COUNT_MEMORY
     after[places] += more
     return after

@@ -1,13 +1,13 @@
-"""Plausible people: what the planner holds possible before it meets anybody.
+"""Plausible people: the hypotheses of the planner before the first interaction. Pure.
 
-Pure. It knows the scoring system, never the person, and imagines two ways in which a person may differ from it:
+The planner knows the scoring system, never the person. A person may differ from the system in two ways:
 
-- *wrong entries*: entries of the scoring table are flipped, each with a small probability. For one strategy that
-  are 2**10 columns; each says which level would suit each triple. All of them are held, for every strategy.
-- *a preference*: the scoring table is right, but for a group of actions (one level of a strategy, or it and all
-  above) success does not depend on the suggestion at all: it comes if and only if capacity, gaze and awareness
-  each lie in some subset of their classes. Subsets of awareness are single classes, all but one, and those that
-  the table's own column marks alike (31 subsets otherwise, which nobody could tell apart in 100 interactions).
+- *wrong entries*: entries of the scoring table are flipped, each with a small probability. One strategy then has
+  2**10 possible columns; each column gives the level that suits each triple. All of them are kept, for every strategy.
+- *a preference*: the scoring table is right except for a group of actions (one level of a strategy, or this level and
+  all above). Their success does not depend on the suggestion: they succeed if and only if capacity, gaze and
+  awareness each are in some subset of their classes. The subsets of awareness are single classes, all classes but
+  one, and those that the table's own column marks alike; 100 interactions could not tell all 31 subsets apart.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from shift_model.scoring import level_index, scaffolding_score
 from shift_model.vocabulary import AWARENESSES, CAPACITIES, GAZES, TRIPLES
-from shift_study.scoring import MARGIN
 from shift_study.study import ScoringSettings, StrategySettings
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 MOST_ENTRIES = 4_000_000
-"""Chosen: of the table of preferences (32 MB); beyond, a preference looks at one feature only."""
+"""Chosen: the most entries of the preferences' table (32 MB); beyond, a preference uses one feature only."""
 
 _PARTS = (("capacity", CAPACITIES), ("gaze", GAZES), ("awareness", AWARENESSES))
 CATEGORIES: tuple[tuple[str, str], ...] = tuple((part, name) for part, names in _PARTS for name in names)
@@ -34,30 +34,30 @@ CATEGORIES: tuple[tuple[str, str], ...] = tuple((part, name) for part, names in 
 
 
 class Columns(NamedTuple):
-    """Every way in which one strategy's column of the scoring table can have wrong entries."""
+    """All columns of the scoring table that one strategy can have, with any entries flipped."""
 
     suits: Floats
     """[columns, 30 x levels]: 1 where the level is the one that the column suggests for the triple."""
     suits_by_level: Floats
-    """The same turned, so that what one result says of all columns lies side by side."""
+    """The transposed array: the entries that one result needs of all columns are contiguous."""
     flips: Ints
     """[columns]: how many entries differ from the study's table."""
     levels: int
 
 
 class Preferences(NamedTuple):
-    """People with the right table, but for one group of actions."""
+    """People for whom the table is right except for one group of actions."""
 
     success: Floats
     """[preferences, 30 x actions]: 1 where the action succeeds."""
     success_by_cell: Floats
-    """The same turned."""
+    """The transposed array."""
     prior: Floats
     """[preferences], sums to 1."""
 
 
 class Plausible(NamedTuple):
-    """All of them, for one scoring system."""
+    """All plausible people around one scoring system."""
 
     levels: Ints
     """[actions, strategies]: each action's levels."""
@@ -66,7 +66,7 @@ class Plausible(NamedTuple):
 
 
 def plausible_people(scoring: ScoringSettings, suggested: tuple[int, ...]) -> Plausible:
-    """Everybody that the planner holds possible around this scoring system."""
+    """Return all plausible people around this scoring system."""
     levels = np.array(list(product(*(range(len(s.levels)) for s in scoring.strategies.values()))))
     columns = tuple(_columns(scoring, name, settings) for name, settings in scoring.strategies.items())
     return Plausible(levels, columns, _preferences(scoring, levels, suggested))
@@ -80,14 +80,14 @@ def _columns(scoring: ScoringSettings, name: str, strategy: StrategySettings) ->
     entries = np.abs(_column(scoring, name) - flipped)
     parts = [part for part, _ in _PARTS]
     rows = np.array([[CATEGORIES.index(c) for c in zip(parts, t, strict=True)] for t in TRIPLES])
-    scores = strategy.weight * entries[:, rows].sum(axis=2) / scoring.s_max
-    ranks = (scores[:, :, None] >= np.array(strategy.thresholds) - MARGIN).sum(axis=2)
-    suits = (ranks[:, :, None] == np.arange(len(strategy.levels))).reshape(len(flipped), -1).astype(np.float64)
+    scores = scaffolding_score(entries[:, rows], strategy.weight, scoring.s_max)
+    levels = level_index(scores, strategy.thresholds)
+    suits = (levels[:, :, None] == np.arange(len(strategy.levels))).reshape(len(flipped), -1).astype(np.float64)
     return Columns(suits, np.ascontiguousarray(suits.T), flipped.sum(axis=1), len(strategy.levels))
 
 
 def _column(scoring: ScoringSettings, name: str) -> Floats:
-    """One strategy's entries for the ten rows."""
+    """Return one strategy's entries for the ten rows."""
     return np.array([getattr(getattr(scoring.table, part), category)[name] for part, category in CATEGORIES])
 
 
@@ -111,7 +111,7 @@ def _preferences(scoring: ScoringSettings, levels: Ints, suggested: tuple[int, .
 
 
 def _groups(levels: Ints) -> list[Ints]:
-    """Indices of the actions with one level of a strategy, and of those at it or above."""
+    """Return the actions with one level of a strategy, and those with a level or any above it, as indices."""
     groups = []
     for column in levels.T:
         count = int(column.max()) + 1
@@ -121,27 +121,30 @@ def _groups(levels: Ints) -> list[Ints]:
 
 
 class Condition(NamedTuple):
-    """Where a preference's actions succeed."""
+    """The triples at which the actions of a preference succeed."""
 
     holds: Bools
     """[30]"""
     prior: float
     features: int
-    """How many of the three it looks at."""
+    """How many of the three features it depends on."""
 
 
 def _conditions(scoring: ScoringSettings) -> list[Condition]:
-    """Each feature is looked at with probability one half, every subset of its classes as probable."""
+    """Return all conditions.
+
+    A condition depends on each feature with probability one half; all subsets of the classes are equally probable.
+    """
     capacity = [set(s) for n in (1, 2) for s in combinations(range(2), n)]
     gaze = [set(s) for n in (1, 2, 3) for s in combinations(range(3), n)]
     found = []
     for subsets in product(capacity, gaze, _awareness_subsets(scoring)):
         masks = [np.isin(np.arange(n), list(s)) for n, s in zip((2, 3, 5), subsets, strict=True)]
         holds = masks[0][:, None, None] & masks[1][:, None] & masks[2]
-        looked = [not mask.all() for mask in masks]
+        used = [not mask.all() for mask in masks]
         counts = (len(capacity), len(gaze), len(_awareness_subsets(scoring)))
-        prior = float(np.prod([0.5 / (n - 1) if look else 0.5 for look, n in zip(looked, counts, strict=True)]))
-        found.append(Condition(holds.reshape(-1), prior, sum(looked)))
+        prior = float(np.prod([0.5 / (n - 1) if uses else 0.5 for uses, n in zip(used, counts, strict=True)]))
+        found.append(Condition(holds.reshape(-1), prior, sum(used)))
     return found
 
 

@@ -1,0 +1,126 @@
+"""The journal's schema: its version, and the migrations that bring an older journal to it.
+
+To change the schema, append a migration; never change one that was released. All migrations that a journal lacks run in
+one transaction, so that a crash leaves the old version whole.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from shift_schemas.errors import InvalidSettings
+
+Migration = Callable[[sqlite3.Connection], None]
+
+APPLICATION_ID = 0x53484654
+"""``SHFT``, in the field of an SQLite file that names its application. The journals of shift-mesh 0.1 and 0.2 have 0
+there, and their ``user_version`` counts how often a full disk was tried: it says nothing about their schema."""
+
+_TABLES = """
+CREATE TABLE IF NOT EXISTS outbox (
+    session TEXT, seq INTEGER, subject TEXT, payload TEXT, PRIMARY KEY (session, seq)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS cursor (
+    session TEXT, owner TEXT, seq INTEGER, PRIMARY KEY (session, owner)) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS state (session TEXT PRIMARY KEY, data TEXT, closed INTEGER DEFAULT 0) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS answer (
+    session TEXT, procedure TEXT, command_id TEXT, content TEXT, result TEXT,
+    PRIMARY KEY (session, procedure, command_id)) WITHOUT ROWID;
+"""
+
+
+class NewerJournal(InvalidSettings):
+    """A journal of a newer shift-mesh, which this one cannot read."""
+
+    title = "The data folder is of a newer version"
+
+
+def _create_tables(db: sqlite3.Connection) -> None:
+    """Create the tables of a new journal; those of shift-mesh 0.1 and 0.2 have them."""
+    for table in _TABLES.split(";"):  # not executescript, which commits
+        db.execute(table)
+
+
+def _rename_digest(db: sqlite3.Connection) -> None:
+    """Rename the column in which shift-mesh 0.1 kept a digest of a command; 0.2 keeps the command's content there."""
+    if any(column[1] == "digest" for column in db.execute("PRAGMA table_info(answer)")):
+        db.execute("ALTER TABLE answer RENAME COLUMN digest TO content")
+
+
+def _create_place(db: sqlite3.Connection) -> None:
+    """Create the table that tells a copied file from one in its old place; shift-mesh 0.1 lacks it."""
+    db.execute("CREATE TABLE IF NOT EXISTS place (one INTEGER PRIMARY KEY, file TEXT)")
+
+
+MIGRATIONS: tuple[Migration, ...] = (_create_tables, _rename_digest, _create_place)
+"""The n-th migration, from 1, brings a journal from version n - 1 to n. A new file has version 0, as those of 0.1 and
+0.2 have."""
+
+
+def schema_version(db: sqlite3.Connection) -> int:
+    """Return the schema version of a journal; 0 for a new one and for those of shift-mesh 0.1 and 0.2."""
+    (application,) = db.execute("PRAGMA application_id").fetchone()
+    (version,) = db.execute("PRAGMA user_version").fetchone()
+    return int(version) if application == APPLICATION_ID else 0
+
+
+def migrate(db: sqlite3.Connection, path: Path, migrations: tuple[Migration, ...] = MIGRATIONS) -> None:
+    """Bring a journal to the newest schema, or leave it as it was.
+
+    Raises
+    ------
+    NewerJournal
+        A newer shift-mesh wrote it.
+    sqlite3.Error
+        It cannot be read or written.
+    """
+    _check_version(db, path, len(migrations))
+    if schema_version(db) == len(migrations):
+        return
+    with _transaction(db):
+        for migration in migrations[schema_version(db) :]:
+            migration(db)
+        db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        db.execute(f"PRAGMA user_version = {len(migrations)}")
+
+
+def check_journals(data: Path) -> None:
+    """Check the journals of a data folder before any service is started, so that the user is told once.
+
+    A journal that cannot be read is left to its service, which says why.
+
+    Raises
+    ------
+    NewerJournal
+        A newer shift-mesh wrote one of them.
+    """
+    for path in sorted((data / "state").glob("*.sqlite")):
+        try:
+            with closing(sqlite3.connect(f"file:{path.absolute()}?mode=rw", uri=True)) as db:
+                _check_version(db, path, len(MIGRATIONS))
+        except sqlite3.Error:
+            continue
+
+
+def _check_version(db: sqlite3.Connection, path: Path, known: int) -> None:
+    found = schema_version(db)
+    if found > known:
+        raise NewerJournal(
+            f"the data folder {path.parent.parent} was written by a newer shift-mesh: its journal {path.name} has "
+            f"schema version {found}, and this shift-mesh reads versions up to {known}; start the newer shift-mesh, or "
+            "use another data folder (--data or SHIFT_DATA)"
+        )
+
+
+@contextmanager
+def _transaction(db: sqlite3.Connection) -> Iterator[None]:
+    db.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        db.execute("COMMIT")
+    except BaseException:
+        if db.in_transaction:
+            db.execute("ROLLBACK")
+        raise

@@ -1,0 +1,44 @@
+"""A service's core as the worker runs it: its fold, its state as text, and what it reads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TypeVar
+
+from shift_schemas.core_protocol import Step
+from shift_schemas.messages import Fact, Message
+from shift_schemas.timestamps import Stamp
+
+S = TypeVar("S")
+
+
+class Recall(Protocol):
+    """A search among the facts of one session that the service itself published."""
+
+    def __call__(self, subject: str, **fields: str | int) -> list[Fact]:
+        """Return the facts of ``subject`` whose fields have these values, oldest first."""
+
+
+class CoreStep(Protocol[S]):
+    """A core's fold."""
+
+    def __call__(self, state: S | None, message: Any, now: Stamp, /, timed_out: bool = False) -> Step[S]:
+        """Return the next state and the facts that follow from ``message``."""
+
+
+@dataclass(frozen=True)
+class Core(Generic[S]):
+    """A core and its inputs: the owners that it reads, and the subjects of each that it steps on."""
+
+    name: str
+    step: CoreStep[S]
+    dump: Callable[[S], str]
+    load: Callable[[str], S]
+    reads: Mapping[str, frozenset[str]]
+    prepare: Callable[[Any, Recall], Any] = lambda message, recall: message
+    """Turns a request's message into what the core steps on, given the facts that were recorded before."""
+    lookups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """By subject of its own, the fields by which ``recall`` finds facts."""
+    streams: Mapping[str, type[Message]] = field(default_factory=dict)
+    """By stream that the service owns, the message that its payloads are decoded as."""
