@@ -1,56 +1,42 @@
-"""What a door is asked, where that is not a message of the mesh itself: one set for REST and ROS 2. Pure."""
+"""The bodies of requests, derived from the commands: one set for REST and ROS 2. Pure.
+
+A body has the command's own fields in their order, without those that services fill in. The path names the session.
+The command id is optional and has a name of its own (``decision_id``); a repeat with the same id gets the first result.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import cache
+from typing import Any
 
-from pydantic import Field, RootModel
+from pydantic import BaseModel, create_model
+from pydantic.fields import FieldInfo
 
 from shift_schemas.ids import Id
-from shift_schemas.messages import JsonObject, Message, Result, Strategy, Text
+from shift_schemas.messages import Command, Mark, Message, PatchBody, PerformanceBody, StartSession
+
+__all__ = ["MarkerBody", "PatchBody", "PerformanceBody", "StartBody", "body_type"]
+
+ID_DESCRIPTION = "Your id for it; a repeat gets the first result."
 
 
-class StartBody(Message):
-    """Begin a session."""
-
-    participant: Id = Field(description="Pseudonym of the participant.")
-    session: Id | None = Field(default=None, description="Left out: a new id.")
-    study: Id | JsonObject = Field(default="default", description="A study's name, or the study itself.")
-    seed: Annotated[int, Field(ge=0, lt=2**53)] | None = Field(default=None, description="Left out: from the id.")
-    condition: Id | None = Field(default=None, description="Left out: the study's own values.")
-
-
-class PatchBody(RootModel[JsonObject]):
-    """Change the study in force: a JSON merge patch (RFC 7386) of it."""
-
-
-class DecisionBody(Message):
-    """Ask for the strategy to use now."""
-
-    task: Id = Field(description="The task that is to be explained.")
-    decision_id: Id | None = Field(default=None, description="Your id for it; a repeat gets the first result.")
+@cache
+def body_type(kind: type[Command]) -> type[BaseModel]:
+    """Return the model of the body with which a client asks for a command."""
+    if kind.body is not None:
+        return kind.body
+    fields: dict[str, Any] = {}
+    for name in kind.body_fields():
+        info = kind.model_fields[name]
+        fields[name] = _optional_id(info.description) if name == kind.id_field else (info.annotation, info)
+    if kind.id_field:
+        fields.setdefault(kind.id_field, _optional_id(ID_DESCRIPTION))
+    return create_model(f"{kind.__name__}Body", __base__=Message, __doc__=kind.__doc__, **fields)
 
 
-class PerformanceBody(Message):
-    """Report how the task went."""
-
-    decision_id: Id = Field(description="The decision that it was done after.")
-    comprehension: Result
-    enabledness: Result
-    corrects: bool = Field(default=False, description="Replace the decision's earlier report; both are recorded.")
+def _optional_id(description: str | None) -> tuple[Any, FieldInfo]:
+    return Id | None, FieldInfo(default=None, description=description)
 
 
-class OverrideBody(Message):
-    """Choose the strategy of the task's next decision yourself."""
-
-    task: Id
-    strategy: Strategy = Field(description="One level of each of the study's strategies.")
-    reason: Text = ""
-    override_id: Id | None = None
-
-
-class MarkerBody(Message):
-    """Note something in the recording."""
-
-    text: Text
-    marker_id: Id | None = None
+StartBody: Any = body_type(StartSession)
+MarkerBody: Any = body_type(Mark)

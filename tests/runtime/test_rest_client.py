@@ -21,7 +21,7 @@ from shift_schemas.errors import (
     Unavailable,
     UnknownThing,
 )
-from shift_schemas.messages import GazeChunk
+from shift_schemas.messages import Command, Configure, GazeChunk, Mark
 
 
 @dataclass
@@ -61,7 +61,7 @@ def gateway() -> Iterator[Gateway]:
             self.end_headers()
             self.wfile.write(text)
 
-        do_GET = do_POST
+        do_GET = do_PATCH = do_POST
 
         def log_message(self, format: str, *args: Any) -> None:
             pass
@@ -118,6 +118,28 @@ def test_each_method_asks_its_path(gateway: Gateway, shift: RestClient) -> None:
         ("GET", "/v1/sessions/s1/config", None),
         ("GET", "/readyz", None),
     ]
+
+
+def test_any_command_with_a_path_can_be_sent(gateway: Gateway, shift: RestClient) -> None:
+    shift.command(Mark, "s1", text="a note", marker_id="m1")
+    shift.command(Configure, "s1", capacity={"start": 0.5})
+    assert gateway.asked == [
+        ("POST", "/v1/sessions/s1/markers", {"text": "a note", "marker_id": "m1"}),
+        ("PATCH", "/v1/sessions/s1/config", {"capacity": {"start": 0.5}}),
+    ]
+    gateway.asked.clear()
+    shift.command(Mark, "s1", text="a note")
+    assert gateway.asked[0][2]["marker_id"].startswith("m-")
+
+
+def test_command_without_a_path_is_refused(gateway: Gateway, shift: RestClient) -> None:
+    class Hidden(Command):
+        owner = "decider"
+        procedure = "hidden"
+
+    with pytest.raises(MalformedMessage, match="hidden has no path in the gateway"):
+        shift.command(Hidden, "s1")
+    assert gateway.asked == []
 
 
 def test_a_command_without_an_id_of_its_own_is_given_one_that_stays_in_every_attempt(

@@ -96,11 +96,9 @@ class PerformanceBody(Message):
 
 
 class ReportPerformance(Command):
-    """Report how the task went.
+    """Report how the task went."""
 
-    ``command_id`` is the decision's id; a correction has an id of its own, and names the decision in ``corrects``.
-    """
-
+    # ``command_id`` is the decision's id; a correction has an id of its own, and names the decision in ``corrects``.
     owner = "learner"
     procedure = "report_performance"
     result = Performance

@@ -9,6 +9,7 @@ import asyncio
 import json
 from typing import Any
 
+from pydantic import BaseModel
 from shift_decider.core import ANY_TASK, decide
 from shift_runtime.clock import Clock
 from shift_runtime.mesh_api import READ_WAIT_S, MeshApi
@@ -16,7 +17,7 @@ from shift_runtime.mesh_client import MeshClient
 from shift_schemas.core_protocol import InputsMissing, covers
 from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, shorten
 from shift_schemas.lifecycle import has_ended
-from shift_schemas.messages import Observation, Seen, Session
+from shift_schemas.messages import Command, Observation, PatchBody, Seen, Session
 from shift_schemas.timestamps import NS
 
 from shift_gateway.session_views import ReadModel, SessionView, decider_state
@@ -79,16 +80,19 @@ class GatewayApi(MeshApi):
             raise Unavailable("the recorder has put out no configuration of this session yet")
         return {**json.loads(view.config.study), "version": view.config.version}
 
-    async def configure(self, session: str, patch: dict[str, Any]) -> dict[str, Any]:
-        """Change the study in force. ``version`` may come along as it was read; it counts the changes itself."""
-        if "version" in patch:
-            version, given = (await self.config(session))["version"], patch["version"]
+    async def command(
+        self, kind: type[Command], session: str, body: BaseModel | None = None
+    ) -> tuple[dict[str, Any], bool]:
+        """Carry out a command. A patch may contain the ``version`` as it was read: it is checked, and left out."""
+        if isinstance(body, PatchBody) and "version" in body.root:
+            version, given = (await self.config(session))["version"], body.root["version"]
             if given != version or isinstance(given, bool):
                 rule = f"it cannot be changed: it counts the changes and is {version} now; leave it out"
                 raise MalformedMessage(
                     f"version: {rule}", (FieldError(field="version", value=shorten(given), rule=rule),)
                 )
-        return await super().configure(session, {name: v for name, v in patch.items() if name != "version"})
+            body = PatchBody({name: v for name, v in body.root.items() if name != "version"})
+        return await super().command(kind, session, body)
 
     async def preview(self, session: str, task: str) -> dict[str, Any]:
         """What a decision made now would carry; the decider's own core on the replica, no side effect."""

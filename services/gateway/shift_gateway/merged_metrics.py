@@ -1,4 +1,4 @@
-"""All services' metrics as one exposition text: families of the same name are put together."""
+"""The metrics of all services as one exposition text, with one family for each name."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from prometheus_client.core import Metric
 from prometheus_client.parser import text_string_to_metric_families
 
 
-class _Gathered:
+class _Merged:
     def __init__(self, texts: Iterable[bytes]) -> None:
         self.texts = list(texts)
 
@@ -22,8 +22,8 @@ class _Gathered:
         yield from families.values()
 
 
-def gathered(texts: Iterable[bytes]) -> bytes:
-    """One text of several services' texts."""
+def merged_metrics(texts: Iterable[bytes]) -> bytes:
+    """Return the metrics of several exposition texts as one."""
     registry = CollectorRegistry()
-    registry.register(_Gathered(texts))
+    registry.register(_Merged(texts))
     return generate_latest(registry)

@@ -75,14 +75,14 @@ def check_size(size: int) -> None:
         raise TooLarge(f"the body is above {BODY_LIMIT // 1024} KB; send gaze in smaller chunks")
 
 
-async def body(request: Request, kind: type[M]) -> M:
-    """The body as a message. Raises :class:`MalformedMessage` that names field, value and rule."""
+async def read_body(request: Request, kind: type[M]) -> M:
+    """Return the body as a message. Raise :class:`MalformedMessage`, which names field, value and rule."""
     check_encoding(request.headers.get("content-encoding", ""))
-    return message(await request.body(), kind, request.query_params.multi_items())
+    return parse_body(await request.body(), kind, request.query_params.multi_items())
 
 
-def message(raw: bytes | str, kind: type[M], query: Iterable[tuple[str, str]] = ()) -> M:
-    """``raw`` as a message. Raises :class:`MalformedMessage`. ``query`` helps to explain an empty body."""
+def parse_body(raw: bytes | str, kind: type[M], query: Iterable[tuple[str, str]] = ()) -> M:
+    """Return ``raw`` as a message. Raise :class:`MalformedMessage`; ``query`` helps to explain an empty body."""
     raw = without_mark(raw)
     try:
         data = parse_json(raw if isinstance(raw, str) else raw.decode())

@@ -1,7 +1,7 @@
-"""A door's own read_model: the latest of every session, folded from all owners' facts.
+"""The read model: the latest of every session, folded from the facts of all owners.
 
-Reads are answered from it. It has no journal: it reads the owners' from the start,
-and until it has, it says that it does not know yet.
+Reads are answered from it. It has no journal of its own: it reads the owners' journals from the start, and reports that
+it does not know yet until it has read them.
 """
 
 from __future__ import annotations
@@ -28,30 +28,32 @@ from shift_study.loading import study_from_json
 from shift_study.study import Study
 
 from shift_runtime.bus.protocol import Bus
+from shift_runtime.deadline import Deadline
 from shift_runtime.reader import Reader, ReadFact
 
 NOTIFICATION_WAIT_S = 0.05
+"""How long a read waits for a notification before it pulls the owners' journals."""
 Listener = Callable[[Fact, str], None]
 
 
 @dataclass
 class SessionView:
-    """One session as far as the replica has read, and what was answered through this door."""
+    """One session as far as the read model has read it, and what its clients were answered."""
 
     fact: Session
     config: Config | None = None
     observation: Observation | None = None
     policy: Policy | None = None
     decisions: dict[str, str] = field(default_factory=dict)
-    """Decision id -> task."""
+    """Each decision id with its task."""
     performances: int = 0
     overrides: dict[str, Override] = field(default_factory=dict)
     n: int = 0
     counts: Counter[str] = field(default_factory=Counter)
     answered: Counter[str] = field(default_factory=Counter)
-    """What this door has answered, as :class:`Seen` counts it: it is in everything that it answers afterwards."""
+    """What clients were answered, counted as :class:`Seen` does: every later answer includes it."""
     sequences: dict[str, int] = field(default_factory=dict)
-    """Per owner, the sequence that its last answer named."""
+    """Per owner, the sequence of its last answer."""
     listeners: list[Listener] = field(default_factory=list)
     changed: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -64,7 +66,7 @@ class SessionView:
 
     @property
     def required(self) -> Seen:
-        """What an answer must have in it: what this door answered, and what it has read."""
+        """What an answer must include: what clients were answered, and what has been read."""
         answered = self.answered
         return Seen(
             decision=max(answered["decision"], self.n),
@@ -89,14 +91,14 @@ class ReadModel:
         return tuple(sorted(set(OWNERS) - self.reader.synced))
 
     async def view(self, session: str) -> SessionView:
-        """The session's view.
+        """Return the session's view.
 
         Raises
         ------
         UnknownThing
             The recorder, asked just now, has no such session.
         Unavailable
-            The recorder cannot be asked.
+            The recorder does not answer.
         """
         if self.missing:
             if "recorder" in self.missing:
@@ -110,30 +112,25 @@ class ReadModel:
         return self.views[session]
 
     async def wait(self, session: str, owners: tuple[str, ...], there: Callable[[], bool], wait_s: float) -> bool:
-        """Wait until ``there()``: for a hint first, then by pulling ``owners``; whether it came."""
-        view = self.views[session]
-        loop = asyncio.get_running_loop()
-        start = loop.time()
-        notification_until = start + min(NOTIFICATION_WAIT_S, wait_s / 2)
-        while not there():
-            left = start + wait_s - loop.time()
-            if left <= 0:
-                return False
-            view.changed.clear()
-            if loop.time() >= notification_until:
-                await self.reader.pull_all(owners)
-                if there():
-                    return True
-                notification_until = loop.time() + 4 * NOTIFICATION_WAIT_S
-            try:
-                pause = min(left, max(0.001, notification_until - loop.time()))
-                await asyncio.wait_for(view.changed.wait(), pause)
-            except TimeoutError:
-                continue
+        """Wait until ``there()``, at most ``wait_s`` seconds. Return whether it is.
+
+        Notifications are awaited first; then the journals of ``owners`` are pulled again and again.
+        """
+        changed = self.views[session].changed
+        next_pull = Deadline(min(NOTIFICATION_WAIT_S, wait_s / 2))
+        try:
+            async with asyncio.timeout(wait_s):
+                while not there():
+                    changed.clear()
+                    if not await next_pull.is_set(changed):
+                        await self.reader.pull_all(owners)
+                        next_pull = Deadline(4 * NOTIFICATION_WAIT_S)
+        except TimeoutError:
+            return there()
         return True
 
     def has_read(self, session: str, owner: str) -> bool:
-        """Whether all that ``owner`` answered through this door has been read back."""
+        """Return whether the read model has all facts of ``owner`` that clients were answered."""
         wanted = self.views[session].sequences.get(owner, 0)
         return self.reader.cursors.get((session, owner), 0) >= wanted
 
@@ -145,20 +142,18 @@ class ReadModel:
                 view = self.views[fact.session] = SessionView(fact)
             view.fact = fact
         if view is None:
-            view = self._early(read)
-            if view is None:
-                return
+            self._defer(read)
+            return
         view.counts[fact.subject] += 1
         _fold(view, fact)
         view.changed.set()
-        for listener in view.listeners:
+        for listener in tuple(view.listeners):
             listener(fact, read.payload)
 
-    def _early(self, read: ReadFact) -> SessionView | None:
-        """A fact of a session that the recorder has not told of yet: it is read again once it has."""
+    def _defer(self, read: ReadFact) -> None:
+        """Read the fact again after the recorder has published its session."""
         self.reader.cursors[read.fact.session, read.owner] = read.seq - 1
         self.reader.pull_soon("recorder")
-        return None
 
 
 def _fold(view: SessionView, fact: Fact) -> None:

@@ -1,6 +1,6 @@
-"""A client of the gateway's REST paths, for the command line, the simulator and people's own Python.
+"""A client of the gateway's REST paths, for the command line, the simulator and your own Python.
 
-Every command carries an id, so a request that got no answer is sent again safely. ::
+Every command carries an id, so a request without an answer is sent again safely. ::
 
     with RestClient("http://127.0.0.1:8080") as shift:
         shift.start("P01", session="s1")
@@ -10,7 +10,7 @@ Every command carries an id, so a request that got no answer is sent again safel
 
 Every error is a :class:`shift_schemas.errors.ShiftError` whose text is a sentence: ``MalformedMessage`` for a value
 that breaks a rule (its ``errors`` name field, value and rule), ``UnknownThing``, ``Conflict``, ``Unavailable`` for a
-gateway or service that does not answer, ``InvalidSettings`` for a URL that is not one.
+gateway or service that does not answer, ``InvalidSettings`` for a text that is not a URL.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from shift_schemas.errors import (
     check_id,
     shorten,
 )
-from shift_schemas.messages import GazeChunk
+from shift_schemas.messages import Command, Decide, EndSession, GazeChunk, ReportPerformance
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_exponential
 
 from shift_runtime.endpoints import check_url
 
 TIMEOUT_S = 60.0
-"""A decision may wait for its study's ``wait_s``; longer than any that is sensible."""
+"""The longest time of one request. It exceeds every sensible ``wait_s`` of a study."""
 READY_TIMEOUT_S = 5.0
 START = "start one with: shift-mesh up"
 
@@ -48,9 +48,9 @@ class RestClient:
     Parameters
     ----------
     patience_s
-        How long a gateway or service may be away before that is an error.
+        How long a gateway or service may not answer before that is an error, seconds.
     timeout_s
-        How long a single request may take.
+        How long a single request may take, seconds.
 
     Raises
     ------
@@ -79,46 +79,62 @@ class RestClient:
     ) -> None:
         self._http.close()
 
+    def command(self, kind: type[Command], session: str, **fields: Any) -> dict[str, Any]:
+        """Carry out any command of a session that has a REST path, such as ``command(Mark, "s1", text="a note")``.
+
+        ``fields`` are those of its body. A command id that is left out, or None, is made here, so that a request
+        without an answer can be sent again.
+        """
+        if kind.route is None:
+            raise MalformedMessage(f"{kind.procedure} has no path in the gateway; send it over Zenoh")
+        check_id("session", session)
+        if kind.id_field and fields.get(kind.id_field) is None:
+            fields[kind.id_field] = f"{kind.id_prefix}{secrets.token_hex(8)}"
+        body = fields if kind.route.media_types else None
+        return self._ask(kind.route.method, kind.route.path.format(session=session), body)
+
     def start(self, participant: str, **given: Any) -> dict[str, Any]:
         """Begin a session; ``given`` is session, study, seed, condition."""
         body = {"participant": participant, "session": f"s-{secrets.token_hex(8)}"}
         return self._ask("POST", "/v1/sessions", body | {k: v for k, v in given.items() if v is not None})
 
     def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
-        """Stream a chunk in."""
+        """Send a chunk of gaze."""
         return self._ask("POST", _path(session, "/gaze"), chunk.model_dump(mode="json", exclude_none=True))
 
     def decide(self, session: str, task: str, decision_id: str | None = None) -> dict[str, Any]:
-        """The strategy to use now."""
-        body = {"task": task, "decision_id": decision_id or f"d-{secrets.token_hex(8)}"}
-        return self._ask("POST", _path(session, "/decisions"), body)
+        """Return the strategy to use now, and why."""
+        return self.command(Decide, session, task=task, decision_id=decision_id)
 
     def report(
         self, session: str, decision_id: str, understood: bool, understood_s: float, able: bool, able_s: float,
         corrects: bool = False,
     ) -> dict[str, Any]:  # fmt: skip
-        """How the task went, each dimension with success and seconds; ``corrects`` replaces an earlier report."""
-        body = {
+        """Report how the task went, each dimension with success and seconds.
+
+        ``corrects`` replaces an earlier report of the same decision.
+        """
+        fields: dict[str, Any] = {
             "decision_id": decision_id,
             "comprehension": {"success": understood, "duration_s": understood_s},
             "enabledness": {"success": able, "duration_s": able_s},
         } | ({"corrects": True} if corrects else {})
-        return self._ask("POST", _path(session, "/performance"), body)
+        return self.command(ReportPerformance, session, **fields)
 
     def end(self, session: str) -> dict[str, Any]:
-        """End the session; its recording is finished then."""
-        return self._ask("POST", _path(session, "/end"))
+        """End the session. It returns once the recording is finished."""
+        return self.command(EndSession, session)
 
     def session(self, session: str) -> dict[str, Any]:
-        """The session, with counts so far."""
+        """Return the session, with counts so far."""
         return self._ask("GET", _path(session))
 
     def observation(self, session: str) -> dict[str, Any]:
-        """The partner model."""
+        """Return the partner model."""
         return self._ask("GET", _path(session, "/observation"))
 
     def config(self, session: str) -> dict[str, Any]:
-        """The study in force, with its version."""
+        """Return the study in force, with its version."""
         return self._ask("GET", _path(session, "/config"))
 
     def ready(self) -> dict[str, Any]:
@@ -149,7 +165,7 @@ class RestClient:
         except httpx.TransportError as e:
             raise Unavailable(f"no gateway answers at {self.url}: {e or type(e).__name__}; {START}") from e
         except httpx.RequestError as e:  # its body cannot be decoded
-            raise self._stranger(f"{e or type(e).__name__}") from e
+            raise self._not_a_gateway(f"{e or type(e).__name__}") from e
         if response.is_success:
             return self._object(response)
         raise self._error_of(response)
@@ -158,9 +174,9 @@ class RestClient:
         try:
             answer = response.json()
         except ValueError as e:
-            raise self._stranger(f"it answered with {_kind_of(response)}") from e
+            raise self._not_a_gateway(f"it answered with {_kind_of(response)}") from e
         if not isinstance(answer, dict):
-            raise self._stranger("its answer is not a JSON object")
+            raise self._not_a_gateway("its answer is not a JSON object")
         return answer
 
     def _error_of(self, response: httpx.Response) -> ShiftError:
@@ -173,9 +189,9 @@ class RestClient:
         except (ValueError, KeyError, TypeError, AttributeError):
             asked = f"{response.request.method} {response.request.url.path}"
             status = f"{response.status_code} {response.reason_phrase}".strip()
-            return self._stranger(f"it answered {asked} with {status} and {_kind_of(response)}")
+            return self._not_a_gateway(f"it answered {asked} with {status} and {_kind_of(response)}")
 
-    def _stranger(self, why: str) -> ShiftError:
+    def _not_a_gateway(self, why: str) -> ShiftError:
         return ShiftError(f"what answers at {self.url} is not a SHIFT gateway: {why}. Is the URL the gateway's?")
 
 

@@ -1,0 +1,41 @@
+"""The paths for operators: liveness, readiness, metrics and the web page."""
+
+from __future__ import annotations
+
+import asyncio
+
+from fastapi import FastAPI, Response
+from fastapi.responses import HTMLResponse, JSONResponse
+from shift_schemas.registry import OWNERS
+
+from shift_gateway.gateway import Gateway
+from shift_gateway.merged_metrics import merged_metrics
+from shift_gateway.page import PAGE, PAGE_POLICY
+from shift_gateway.readiness import readiness
+
+
+def add_operations(app: FastAPI, gateway: Gateway) -> None:
+    """Add the paths."""
+
+    @app.get("/healthz", tags=["operations"])
+    async def healthz() -> dict[str, str]:
+        """Answer that the process is up."""
+        return {"status": "up"}
+
+    @app.get("/readyz", tags=["operations"])
+    async def readyz() -> Response:
+        """Return whether every service answers and is ready; names those that are not."""
+        answers = await asyncio.gather(*(gateway.mesh.health(owner) for owner in OWNERS))
+        content = readiness(dict(zip(OWNERS, answers, strict=True)), gateway.health())
+        return JSONResponse(content, 200 if content["ready"] else 503)
+
+    @app.get("/metrics", tags=["operations"])
+    async def metrics() -> Response:
+        """Return the Prometheus metrics of all services."""
+        texts = await asyncio.gather(*(gateway.mesh.metrics(service) for service in (*OWNERS, "ros2_bridge")))
+        text = merged_metrics([gateway.metrics_text(), *(t for t in texts if t)])
+        return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")
+
+    @app.get("/", include_in_schema=False)
+    async def page() -> HTMLResponse:
+        return HTMLResponse(PAGE, headers={"Content-Security-Policy": PAGE_POLICY})
