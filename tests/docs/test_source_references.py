@@ -40,3 +40,10 @@ def test_each_equation_is_computed_where_the_model_page_says(path: str, name: st
 
 def test_the_model_page_names_the_functions_of_the_whole_model() -> None:
     assert len(equations()) >= 11
+
+
+def test_the_layout_shows_every_package() -> None:
+    page = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
+    layout = page[page.index("## The layout") : page.index("## The tests")]
+    rooms = {path.parent.parent.name for path in ROOT.glob("services/*/shift_*/__init__.py")}
+    assert [room for room in sorted(rooms) if not re.search(rf"\b{room}\b", layout)] == []
