@@ -7,7 +7,7 @@ from math import exp
 import numpy as np
 import pytest
 from shift_schemas.errors import InvalidSettings
-from shift_simulator.batched_sessions import costs
+from shift_simulator.batched_sessions import action_costs
 from shift_simulator.compare import rewards_of
 from shift_simulator.optimum import optimum
 from shift_simulator.users import User, paper_user
@@ -23,7 +23,7 @@ def test_the_optimum_of_the_papers_users(name: str, known: float) -> None:
 
 def naive_optimum(user: User, episodes: int) -> float:
     """By recursion over sessions: capacity, previous action, gaze, awareness of each task."""
-    s, cost = STUDY.capacity, costs(STUDY.capacity, STUDY)
+    s, cost = STUDY.capacity, action_costs(STUDY.capacity, STUDY)
     size = float(np.mean([exp(-0.1 * t) for t in (4, 5, 6, 7, 8)]))
 
     def value(n: int, capacity: float, previous: int, gaze: int, tasks: tuple[int, ...]) -> float:

@@ -18,8 +18,8 @@ from shift_study.scoring import suggestions
 from shift_study.study import Study
 
 from shift_simulator import ENV_ID
-from shift_simulator.batched_sessions import Partners
-from shift_simulator.random_streams import drawn
+from shift_simulator.batched_sessions import BatchedPersons
+from shift_simulator.random_streams import draws_of
 from shift_simulator.users import ACTIONS, PAPER_USERS, User, paper_user, parse_user
 
 
@@ -74,10 +74,10 @@ class PartnerEnv(gymnasium.Env[np.int64, np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.int64, dict[str, Any]]:
-        """A new session; its seed is drawn from the environment's generator."""
+        """A new session; its seed is draws_of from the environment's generator."""
         super().reset(seed=seed)
         seeds = self.np_random.integers(2**53, size=1)
-        self._partners = Partners(self._user, self._study, drawn(seeds, self._episodes + 1))
+        self._partners = BatchedPersons(self._user, self._study, draws_of(seeds, self._episodes + 1))
         self._done = 0
         return self._seen()
 

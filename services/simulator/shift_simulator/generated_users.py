@@ -1,7 +1,7 @@
-"""Users who deviate from the scoring table, generated: what a learner is tried on besides A to D.
+"""Generated users whose reactions differ from the scoring table, for trying learners on more than users A to D.
 
-Pure; each family is a function of a numpy generator, so one seed gives one person. The planner's constants were
-chosen on these and never on A to D.
+Pure; each family is a function of a numpy generator, so one seed gives one user. The planner's constants were
+chosen with these users and never with A to D.
 """
 
 from __future__ import annotations
@@ -22,38 +22,38 @@ SHAPE = (2, 3, 5)
 
 
 def flipped(rng: np.random.Generator, entries: int) -> User:
-    """The right action is what the scoring system suggests with this many of its twenty entries flipped."""
+    """Return a user for whom the scoring system is right once ``entries`` of its twenty entries are flipped."""
     return _user(_flipped(rng, entries))
 
 
 def picky(rng: np.random.Generator) -> User:
-    """At most one flipped entry; and one group of actions succeeds if and only if a random condition holds."""
+    """Return a user with at most one flipped entry; a group of actions succeeds only under a random condition."""
     return _user(_picky(rng))
 
 
 def random_right(rng: np.random.Generator) -> User:
-    """In each triple one action is right, any of the six."""
+    """Return a user for whom one random action of the six is right in each triple."""
     return _user(_right(rng.integers(ACTIONS, size=len(TRIPLES))))
 
 
 def random_table(rng: np.random.Generator) -> User:
-    """Each action succeeds in each triple with probability 0.4."""
+    """Return a user for whom each action succeeds in each triple with probability 0.4."""
     return _user((rng.random((len(TRIPLES), ACTIONS)) < 0.4).astype(np.float64))
 
 
 def changing(rng: np.random.Generator) -> User:
-    """A picky person who becomes one with up to two flipped entries after 50 interactions."""
+    """Return a picky user who changes to up to two flipped entries after 50 interactions."""
     first, then = _picky(rng), _flipped(rng, int(rng.integers(3)))
     return _user(first, changes=[{"at": 50, "success": then.tolist()}])
 
 
 def independent(rng: np.random.Generator) -> User:
-    """One flipped entry; the gaze class is drawn anew each time."""
+    """Return a user with one flipped entry whose gaze class is drawn again each time."""
     return _user(_flipped(rng, 1), gaze={"keep": 0.0})
 
 
-def otherwise_tired(rng: np.random.Generator) -> User:
-    """A picky person whose capacity follows other constants than the study believes, the other way round."""
+def wrong_capacity(rng: np.random.Generator) -> User:
+    """Return a picky user whose capacity follows other constants than the study assumes."""
     return _user(_picky(rng), capacity={"recovery": 0.1, "demanding_cost": 0.1, "other_cost": 0.2})
 
 
@@ -66,16 +66,16 @@ FAMILIES: dict[str, Callable[[np.random.Generator], User]] = {
     "random table": random_table,
     "changing": changing,
     "independent gaze": independent,
-    "wrong capacity constants": otherwise_tired,
+    "wrong capacity constants": wrong_capacity,
 }
-"""By the names that the documentation gives them."""
+"""The families by their names in the documentation."""
 
 
 # --- tables ---
 
 
 def _user(table: Floats, **differs: object) -> User:
-    return User.model_validate({"user": "deviant", "success": table.tolist()} | differs)
+    return User.model_validate({"user": "generated", "success": table.tolist()} | differs)
 
 
 def _right(actions: Ints | tuple[int, ...]) -> Floats:

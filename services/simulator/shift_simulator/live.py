@@ -57,7 +57,7 @@ def drive(shift: RestClient, session: str, user: User, episodes: int) -> Iterato
             session, decision["decision_id"],
             outcome.success, outcome.comprehension_s, outcome.success, outcome.enabledness_s,
         )  # fmt: skip
-        someone = someone.executed(action)
+        someone = someone.after(action)
         yield LiveEpisode(decision, performance)
 
 

@@ -14,11 +14,19 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from shift_model.capacity import is_high, next_capacity
 from shift_model.vocabulary import AWARENESSES, GAZES
 from shift_schemas.errors import InvalidSettings
-from shift_study.study import CapacitySettings, Study
+from shift_study.study import Study
 
-from shift_simulator.batched_sessions import FAILURE, FOCUSED, MARGIN, SUCCESS, check_simulable, costs, rewards
+from shift_simulator.batched_sessions import (
+    FAILURE,
+    FOCUSED,
+    SUCCESS,
+    action_costs,
+    check_simulable,
+    reward_table,
+)
 from shift_simulator.random_streams import Floats, Ints
 from shift_simulator.users import ACTIONS, DEVIATION, User, true_capacity
 
@@ -32,11 +40,11 @@ Counts = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
-class Batteries:
-    """The reachable (shown, true) capacities with the previous action, as a graph; 0 is the start."""
+class CapacityGraph:
+    """The reachable pairs of estimated and true capacity with the previous action; node 0 is the start."""
 
     after: NDArray[np.int64]
-    """[batteries, actions]: the battery after an action."""
+    """[nodes, actions]: the node after an action."""
     shown_high: Ints
     true_high: Ints
 
@@ -47,19 +55,19 @@ def optimum(user: User, study: Study, episodes: int) -> float:
     Raises :class:`InvalidSettings` where its states are too many to enumerate.
     """
     check_simulable(study)
-    batteries = _batteries(user, study)
+    graph = _capacity_graph(user, study)
     counts = _counts(user.tasks)
-    if len(batteries.after) * len(GAZES) * len(counts) > MOST_STATES:
+    if len(graph.after) * len(GAZES) * len(counts) > MOST_STATES:
         raise InvalidSettings(f"user {user.user} has too many states for the exact optimum; leave out --regret")
-    scale = float(rewards(study.reward)[1].mean())
-    value = np.zeros((len(batteries.after), len(GAZES), len(counts)))
+    scale = float(reward_table(study.reward)[1].mean())
+    value = np.zeros((len(graph.after), len(GAZES), len(counts)))
     for n in range(episodes, 0, -1):
-        value = _backed_up(value, user, n, batteries, counts, scale)
+        value = _backed_up(value, user, n, graph, counts, scale)
     return float(value[0, FOCUSED, counts.index((user.tasks, 0, 0))])
 
 
-def _backed_up(value: Floats, user: User, n: int, batteries: Batteries, counts: list[Counts], scale: float) -> Floats:
-    """The value before interaction ``n`` from the value after it, [batteries, gaze, counts].
+def _backed_up(value: Floats, user: User, n: int, graph: CapacityGraph, counts: list[Counts], scale: float) -> Floats:
+    """The value before interaction ``n`` from the value after it, [nodes, gaze, counts].
 
     The value before is taken over the task that is drawn: each class in proportion to its count.
     """
@@ -67,11 +75,11 @@ def _backed_up(value: Floats, user: User, n: int, batteries: Batteries, counts: 
     chance = DEVIATION / 2 + (1 - DEVIATION) * user.table_at(n).reshape(2, len(GAZES), len(AWARENESSES), ACTIONS)
     before = np.zeros_like(value)
     for i, awareness in enumerate(SEEN):
-        p = chance[batteries.true_high][:, :, awareness, :]  # [batteries, gaze, actions]
+        p = chance[graph.true_high][:, :, awareness, :]  # [nodes, gaze, actions]
         drawn, succeeded, failed = _moves(counts, i)
         best = np.full((len(value), len(GAZES), len(drawn)), -np.inf)
         for action in range(ACTIONS):
-            then = following[batteries.after[:, action]]
+            then = following[graph.after[:, action]]
             chosen = p[:, :, action, None]
             gain = chosen * (scale + then[:, :, succeeded]) + (1 - chosen) * (then[:, :, failed] - scale)
             best = np.maximum(best, gain)
@@ -100,17 +108,19 @@ def _counts(tasks: int) -> list[Counts]:
     return [(u, f, tasks - u - f) for u, f in product(range(tasks + 1), repeat=2) if u + f <= tasks]
 
 
-def _batteries(user: User, study: Study) -> Batteries:
-    """Walk all actions from the start until nothing new comes up; values that differ by rounding are one."""
+def _capacity_graph(user: User, study: Study) -> CapacityGraph:
+    """Follow all actions from the start until no new node appears; values that differ by rounding are equal."""
     both = (study.capacity, true_capacity(user, study))
-    cost = [costs(settings, study) for settings in both]
+    cost = [action_costs(settings, study) for settings in both]
     found: dict[tuple[float, float, int], int] = {(both[0].start, both[1].start, -1): 0}
     queue, after = list(found), []
     for shown, true, previous in queue:
         row = []
         for action in range(ACTIONS):
             values = [
-                _executed(v, s, float(c[action]), action == previous)
+                next_capacity(
+                    v, action == previous, float(c[action]), recovery=s.recovery, minimum=s.min, maximum=s.max
+                )
                 for v, s, c in zip((shown, true), both, cost, strict=True)
             ]
             key = (round(values[0], 9), round(values[1], 9), action)
@@ -121,9 +131,5 @@ def _batteries(user: User, study: Study) -> Batteries:
         after.append(row)
         if len(found) > MOST_STATES // len(GAZES):
             raise InvalidSettings(f"user {user.user} has too many capacities for the exact optimum; leave out --regret")
-    high = [np.array([int(k[i] >= s.threshold - MARGIN) for k in queue]) for i, s in enumerate(both)]
-    return Batteries(np.array(after), high[0], high[1])
-
-
-def _executed(value: float, settings: CapacitySettings, cost: float, repeated: bool) -> float:
-    return min(value + settings.recovery, settings.max) if repeated else max(value - cost, settings.min)
+    high = [np.array([int(is_high(k[i], s.threshold)) for k in queue]) for i, s in enumerate(both)]
+    return CapacityGraph(np.array(after), high[0], high[1])

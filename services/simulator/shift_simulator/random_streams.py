@@ -1,7 +1,7 @@
-"""Every random number of a simulated session, by its address (session seed, n, stream).
+"""Counter-based random numbers of a simulated session: each has the address (session seed, n, stream).
 
-Pure. One run at a time (``people``) and many at once (``dynamics``) read the same addresses, so they meet the
-same luck. Stream 0 is the decider's own draw; the others are the person's.
+Pure. ``simulated_person`` (one run) and ``batched_sessions`` (many) read the same addresses, so they get the same
+numbers. The decider draws from stream 0; the person draws from the others.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ Bools = NDArray[np.bool_]
 
 
 def session_seed(seed: int, run: int) -> int:
-    """The seed of run ``run`` (from 0) of an experiment with seed ``seed``: 53 bits at (seed, run, SESSION)."""
+    """Return the seed of run ``run`` (from 0) of an experiment with seed ``seed``: 53 bits at (seed, run, SESSION)."""
     return int(uniform(seed, run, SESSION) * 2**53)
 
 
 def session_seeds(seed: int, runs: int) -> Ints:
-    """:func:`session_seed` of runs 0, 1, ..., int [runs]."""
+    """Return :func:`session_seed` of runs 0, 1, ..., int [runs]."""
     numbers = uniform(np.full(runs, seed, dtype=np.uint64), np.arange(runs), SESSION)
     return (numbers * 2**53).astype(np.int64)
 
 
 def index(u: Floats, n: int) -> Ints:
-    """Which of ``n`` equal parts of [0, 1) each draw falls into."""
+    """Return which of ``n`` equal parts of [0, 1) each draw falls into."""
     return (u * n).astype(np.int64)
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Draws of many sessions as uniform numbers, each float [episodes, runs]."""
+    """Uniform random numbers of many sessions, each float [episodes, runs]."""
 
     decision: Floats
     task: Floats
@@ -51,10 +51,11 @@ class Draws:
     t_enabledness: Floats
 
 
-def drawn(seeds: Ints, episodes: int, copies: int = 1) -> Draws:
-    """The draws of sessions with these seeds, n = 1 .. ``episodes``.
+def draws_of(seeds: Ints, episodes: int, copies: int = 1) -> Draws:
+    """Return the random numbers of sessions with these seeds, n = 1 .. ``episodes``.
 
-    ``copies`` repeats the runs side by side: the rows of a table then meet the same luck, and are compared pairwise.
+    ``copies`` repeats the runs side by side, so that the rows of a table get the same numbers and can be compared in
+    pairs.
     """
     numbers = np.arange(1, episodes + 1)[:, None]
     streams = (DECISION, TASK, GAZE_KEPT, GAZE_CLASS, DEVIATES, COIN, SUCCESS, T_COMPREHENSION, T_ENABLEDNESS)

@@ -1,7 +1,7 @@
-"""One simulated session, an event at a time, through the very cores that the services run.
+"""One simulated session, one event at a time, through the cores that the services run.
 
-Pure: no bus, no clock. It meets the same people and the same draws as ``dynamics`` does for many runs at once, and
-the live driver over HTTP; with a discount of 0 all three agree step by step for the same session seed.
+Pure: there is no bus and no clock. Its persons and random numbers are those of ``batched_sessions`` and of the live
+driver over HTTP; with a discount of 0 all three agree step by step for the same session seed.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def play(user: User, study: Study, seed: int, episodes: int) -> Iterator[Episode
         decision = mesh.decide(tasks[someone.next_task(n)], n)
         action = decision.actions.index(decision.strategy)
         performance = mesh.report(someone, decision, action)
-        someone = someone.executed(action)
+        someone = someone.after(action)
         yield Episode(observation, decision, action, performance)
 
 

@@ -1,9 +1,8 @@
-"""One simulated person, an event at a time.
+"""One simulated person, one event at a time.
 
-Pure: every answer follows from the user, the seed and the number of the interaction. What the person was told
-so far is in :attr:`SimulatedPerson.capacity`; :meth:`SimulatedPerson.executed` gives the person after one more
-strategy. A driver asks, for n = 1, 2, ...: ``next_task(n)``, ``wanted_gaze(n)``, then, once the decision is there,
-``perform(n, ...)``, and goes on with ``executed(action)``.
+Pure: every answer follows from the user, the seed and the number of the interaction. A driver calls, for
+n = 1, 2, ...: ``next_task(n)`` and ``wanted_gaze(n)``; after the decision ``perform(n, ...)``; and it goes on with
+the person that ``after(action)`` returns.
 """
 
 from __future__ import annotations
@@ -12,12 +11,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
+from shift_model.capacity import capacity_class, next_capacity
 from shift_model.random_numbers import uniform
 from shift_model.vocabulary import GAZES, GazeClass, Triple
 from shift_schemas.errors import InvalidSettings
 from shift_study.study import CapacitySettings, Study
 
-from shift_simulator.batched_sessions import MARGIN, costs
+from shift_simulator.batched_sessions import action_costs
 from shift_simulator.random_streams import (
     COIN,
     DEVIATES,
@@ -32,7 +32,7 @@ from shift_simulator.users import DEVIATION, DURATIONS, User, true_capacity
 
 
 class Outcome(NamedTuple):
-    """How a task went; both dimensions succeed or fail together."""
+    """The outcome of a task; both dimensions succeed or fail together."""
 
     success: bool
     comprehension_s: float
@@ -41,7 +41,7 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class SimulatedPerson:
-    """A user of one study in one session. Start with :func:`person`."""
+    """A simulated user in one session of a study. :func:`person` makes one."""
 
     user: User
     study: Study
@@ -50,33 +50,33 @@ class SimulatedPerson:
     capacity: float
     """Its true processing capacity."""
     previous: int | None = None
-    """The action it was told with last."""
+    """The action of the last explanation, an index."""
 
     def next_task(self, n: int) -> int:
-        """Which of its tasks interaction ``n`` is about, from 0: uniform with replacement."""
+        """Return the task (from 0) of interaction ``n``: uniform with replacement."""
         return int(uniform(self.seed, n, TASK) * self.user.tasks)
 
     def wanted_gaze(self, n: int) -> GazeClass:
-        """The gaze class during interaction ``n``: focused at first, then kept or drawn anew."""
+        """Return the gaze class during interaction ``n``: focused at first, then kept or drawn again."""
         while n > 1 and uniform(self.seed, n, GAZE_KEPT) < self.user.gaze.keep:
             n -= 1
         return "focused" if n <= 1 else GAZES[int(uniform(self.seed, n, GAZE_CLASS) * len(GAZES))]
 
     def perform(self, n: int, triple: Triple, action: int) -> Outcome:
-        """The outcome of the action (its index) at the triple that the decision shows.
+        """Return the outcome of the action (an index) at the triple that the decision shows.
 
-        Looked up with the person's true capacity class, then a fair coin with probability 0.05.
+        The table is read at the person's true capacity class; with probability 0.05 a fair coin decides instead.
         """
         lasts = [DURATIONS[int(uniform(self.seed, n, s) * len(DURATIONS))] for s in (T_COMPREHENSION, T_ENABLEDNESS)]
         return Outcome(self._succeeds(n, triple, action), float(lasts[0]), float(lasts[1]))
 
-    def executed(self, action: int) -> SimulatedPerson:
-        """The person after being told with this action: its capacity recovers by repetition, else it pays."""
+    def after(self, action: int) -> SimulatedPerson:
+        """Return the person after an explanation with this action, by the capacity equation."""
         s = self._settings
-        if action == self.previous:
-            capacity = min(self.capacity + s.recovery, s.max)
-        else:
-            capacity = max(self.capacity - float(costs(s, self.study)[action]), s.min)
+        capacity = next_capacity(
+            self.capacity, action == self.previous, float(action_costs(s, self.study)[action]),
+            recovery=s.recovery, minimum=s.min, maximum=s.max,
+        )  # fmt: skip
         return replace(self, capacity=capacity, previous=action)
 
     @cached_property
@@ -88,19 +88,19 @@ class SimulatedPerson:
             return uniform(self.seed, n, COIN) < 0.5
         true = triple
         if self._settings != self.study.capacity:
-            true = triple._replace(capacity="high" if self.capacity >= self._settings.threshold - MARGIN else "low")
+            true = triple._replace(capacity=capacity_class(self.capacity, self._settings.threshold))
         return uniform(self.seed, n, SUCCESS) < float(self.user.table_at(n)[true.number, action])
 
 
 def person(user: User, study: Study, seed: int) -> SimulatedPerson:
-    """A person at the start of a session with this seed."""
+    """Return the person at the start of a session with this seed."""
     return SimulatedPerson(user, study, seed, true_capacity(user, study).start)
 
 
 def task_names(user: User, study: Study) -> list[str]:
-    """What the person's tasks are called: the study's first ones, or task-1, task-2, ... where any id is a task.
+    """Return the names of the person's tasks: the study's first ones, or task-1, task-2, ... if any id is a task.
 
-    Raises :class:`InvalidSettings` where the study has fewer tasks than the person.
+    Raises :class:`InvalidSettings` if the study has fewer tasks than the person.
     """
     if study.tasks is None:
         return [f"task-{i + 1}" for i in range(user.tasks)]

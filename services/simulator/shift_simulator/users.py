@@ -1,8 +1,8 @@
 """Simulated users: for each of the 30 triples and 6 actions, how probable success is.
 
 Pure. Users A to D are the paper's (section V-B; MODEL.md, section 5); any other comes from a user file,
-which is JSON (INTERFACE.md, "Command line"). A user is data: how it behaves over time is ``dynamics`` for many
-runs at once and ``people`` for one.
+which is JSON (INTERFACE.md, "Command line"). A user is data: ``batched_sessions`` simulates many runs of it
+at once, ``simulated_person`` one.
 """
 
 from __future__ import annotations
