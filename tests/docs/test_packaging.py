@@ -1,4 +1,4 @@
-"""The distribution holds every package."""
+"""The distribution contains every package, and the lock files name no package index."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The README's tour works as printed, against a mesh of its own."""
+"""The README's command lines and programs work as printed, with a mesh of their own."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ BLOCK = re.compile(r"(?:<!-- (.*?) -->\n)?```(\w+)\n(.*?)```", re.DOTALL)
 
 
 def blocks(mark: str, language: str) -> list[str]:
-    """The README's blocks in a language that have this comment before them."""
+    """Return the README's blocks of a language that follow a comment with this text."""
     found = BLOCK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
     return [text for marked, kind, text in found if (marked, kind) == (mark, language)]
 
 
 def in_a_fresh_clone(folder: Path, mesh: LiveMesh) -> dict[str, str]:
-    """Make ``folder`` look like a clone in which ``make up`` runs; the environment that leads to this test's mesh."""
+    """Make ``folder`` look like a fresh clone. Return the environment that leads programs to this test's mesh."""
     for name in ("docs", "tests"):
         (folder / name).symlink_to(ROOT / name)
     return {
@@ -35,11 +35,12 @@ def in_a_fresh_clone(folder: Path, mesh: LiveMesh) -> dict[str, str]:
 
 
 def as_here(text: str, mesh: LiveMesh) -> str:
+    """Return the text with this test's mesh and Python in place of those that the README assumes."""
     text = text.replace("http://127.0.0.1:8080", mesh.url)
     return text.replace(".venv/bin/shift-mesh", f"{sys.executable} -m shift_cli.main")
 
 
-def test_every_other_line_works_as_printed(tmp_path: Path) -> None:
+def test_every_line_outside_the_tour_works_as_printed(tmp_path: Path) -> None:
     make, *lines = blocks("", "sh")
     programs, (study,), ros = blocks("", "python"), blocks("", "yaml"), blocks("until Ctrl-C", "sh")
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -63,16 +64,17 @@ def test_every_other_line_works_as_printed(tmp_path: Path) -> None:
 
 
 def until_ctrl_c(line: str, env: dict[str, str], folder: Path) -> None:
+    """Run a line until it says that its session began, stop it as Ctrl-C does, and check that it ends well."""
     process = subprocess.Popen(["bash", "-euc", f"exec {line}"], cwd=folder, env=env, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
-    assert any(" session begun " in line for line in process.stderr), "it ended before"
+    assert any(" session begun " in line for line in process.stderr), "it ended before its session began"
     process.send_signal(signal.SIGINT)
     said = process.stderr.read()
     assert process.wait(60) == 0, said
     assert "Traceback" not in said
 
 
-def test_the_example_of_a_user_file_has_a_place_for_everything_that_is_often_changed() -> None:
+def test_example_of_a_user_file_has_every_field_that_is_often_changed() -> None:
     example = json.loads((ROOT / "docs" / "examples" / "my-user.json").read_text(encoding="utf-8"))
     assert set(example) == {"user", "success", "gaze", "tasks", "capacity"}
 
@@ -97,15 +99,9 @@ def test_the_tour_works_as_printed(tmp_path: Path) -> None:
     assert json.loads(ended)["counts"]["decision"] == 1
 
 
-def test_the_studys_tables_are_current() -> None:
+def test_tables_of_the_study_page_are_current() -> None:
     sys.path.insert(0, str(ROOT / "docs"))
     import make_study_reference
 
     page = make_study_reference.PAGE.read_text(encoding="utf-8")
     assert make_study_reference.with_tables(page) == page, "run: python docs/make_study_reference.py"
-
-
-def test_every_page_that_the_readme_links_to_is_there() -> None:
-    links = re.findall(r"\]\((?!https?:|#)([^)]+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
-    assert links
-    assert [link for link in links if not (ROOT / link).exists()] == []

@@ -40,3 +40,26 @@ def test_each_equation_is_computed_where_the_model_page_says(path: str, name: st
 
 def test_the_model_page_names_the_functions_of_the_whole_model() -> None:
     assert len(equations()) >= 11
+
+
+def test_the_layout_shows_every_package() -> None:
+    page = (ROOT / "docs" / "contributing.md").read_text(encoding="utf-8")
+    layout = page[page.index("## The layout") : page.index("## The tests")]
+    rooms = {path.parent.parent.name for path in ROOT.glob("services/*/shift_*/__init__.py")}
+    assert [room for room in sorted(rooms) if not re.search(rf"\b{room}\b", layout)] == []
+
+
+CITED = re.compile(r"docs/([a-z0-9-]+\.md)(?:, (section|row)s? ([\d.]+)|, \"([^\"\n]+)\")?")
+
+
+def test_every_page_section_and_row_that_the_source_cites_exists() -> None:
+    missing = []
+    for file in ROOT.glob("[a-z]*/**/*.py"):
+        for name, kind, number, heading in CITED.findall(file.read_text(encoding="utf-8")):
+            page = ROOT / "docs" / name
+            text = page.read_text(encoding="utf-8") if page.exists() else ""
+            start = {"section": rf"^##+ {number.rstrip('.')}[. ]", "row": rf"^\| {number} \|"}.get(kind, "")
+            wanted = start or (rf"^##+ {re.escape(heading)}$" if heading else "")
+            if not page.exists() or not re.search(wanted, text, re.MULTILINE):
+                missing.append((str(file.relative_to(ROOT)), name, kind, number, heading))
+    assert missing == []

@@ -1,10 +1,10 @@
-"""Train an agent from outside on a simulated partner: tabular SARSA through Gymnasium.
+"""Train an agent of your own on a simulated partner, through Gymnasium: tabular SARSA.
 
     pip install gymnasium
-    python docs/train_outside_agent.py
+    python docs/examples/train_outside_agent.py
 
-Sutton & Barto 2018, section 6.4. It needs thousands of sessions where the planner has one; what it shows is that any
-agent that speaks Gymnasium can be tried on these people.
+The rule is in Sutton & Barto 2018, section 6.4. SARSA needs about a thousand sessions for what the planner does in
+one. The example shows that any agent that uses Gymnasium can be tried with these simulated people.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ SESSIONS, LEARNING_RATE, DISCOUNT, EPSILON = 1000, 0.1, 0.9, 0.1
 
 
 def main() -> None:
-    """Print the mean reward of each tenth of the training. A state is the triple and the action before."""
+    """Print the mean reward of each tenth of the training. A state is the triple and the previous action."""
     env = gymnasium.make("shift_simulator.env:shift/Partner-v0", user="B", observation="triples")
     rng = np.random.default_rng(0)
     actions = env.action_space.n
