@@ -6,7 +6,7 @@ from shift_learner.service import CORE
 
 
 def main() -> None:
-    """Run the learner until it is stopped."""
+    """Run the learner."""
     run_service(CORE)
 
 

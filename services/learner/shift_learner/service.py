@@ -1,4 +1,4 @@
-"""The learner as a service: its core, and the streams that it reads."""
+"""The learner's shell: its core and the owners that it reads. The worker does the rest."""
 
 from __future__ import annotations
 

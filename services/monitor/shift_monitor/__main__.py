@@ -6,7 +6,7 @@ from shift_monitor.service import CORE
 
 
 def main() -> None:
-    """Run the monitor until it is stopped."""
+    """Run the monitor."""
     run_service(CORE)
 
 

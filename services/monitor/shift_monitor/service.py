@@ -1,4 +1,4 @@
-"""The monitor as a service: its core, the streams that it reads, and the lookup that its gaze needs."""
+"""The monitor's shell: its core and the owners that it reads. The worker does the rest."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from shift_monitor.core import MonitorState
 from shift_monitor.gaze_input import gaze_input
 
 
-def add_earlier_gaze(message: Any, recall: Recall) -> Any:
-    """Return a chunk of gaze with the records of its number; return any other message unchanged."""
+def prepared(message: Any, recall: Recall) -> Any:
+    """Return a chunk of gaze together with the fact that was recorded under its number before."""
     return gaze_input(message, recall) if isinstance(message, GazeChunk) else message
 
 
@@ -24,7 +24,7 @@ CORE: Core[MonitorState] = Core(
     dump=core.dump,
     load=core.load,
     reads=READS["monitor"],
-    prepare=add_earlier_gaze,
+    prepare=prepared,
     lookups={"gaze": ("source", "seq")},
     streams={"gaze": GazeChunk},
 )
