@@ -87,8 +87,8 @@ def test_a_doubt_of_the_whole_study_is_said_once() -> None:
 
 def test_a_parameter_that_the_learner_does_not_read_is_warned_about() -> None:
     assert warned(learner={"name": "scoring", "epsilon": 0.75, "noise": 1.0}) == (
-        "learner.epsilon has no effect: scoring takes no notice of it; it is a parameter of q-learning, epsilon-greedy",
-        "learner.noise has no effect: scoring takes no notice of it; it is a parameter of linear-thompson",
+        "learner.epsilon has no effect: scoring does not read it; it is a parameter of q-learning, epsilon-greedy",
+        "learner.noise has no effect: scoring does not read it; it is a parameter of linear-thompson",
     )
     assert warned(learner={"name": "epsilon-greedy", "epsilon": 0.75}) == ()
 
@@ -104,7 +104,7 @@ def test_a_parameter_that_one_condition_s_learner_reads_has_an_effect() -> None:
     assert warned(learner={"epsilon": 0.5}, conditions=conditions) == ()
     conditions["control"]["learner"]["epsilon"] = 0.1
     (sentence,) = warned(conditions=conditions)
-    assert sentence.startswith("conditions.control.learner.epsilon has no effect: scoring takes no notice of it")
+    assert sentence.startswith("conditions.control.learner.epsilon has no effect: scoring does not read it")
 
 
 def test_every_parameter_belongs_to_a_learner() -> None:

@@ -14,7 +14,8 @@ from shift_schemas.errors import InvalidStudy
 from shift_study.loading import parse_study, study_data, study_of
 from shift_study.study import Study
 from shift_study.yaml_numbers import core_number, core_value
-from shift_study.yaml_reader import read_yaml, write_yaml
+from shift_study.yaml_reader import read_yaml
+from shift_study.yaml_writer import write_yaml
 from support.message_strategies import json_values
 
 WORDS = ["yes", "no", "on", "off", "true", "y", "n", "01", "010", "1", "2024", "2024-01-01", "1e3", "0x1F", "1_000"]
@@ -172,7 +173,7 @@ def test_a_value_with_nothing_written_is_refused(text: str, field: str) -> None:
 
 
 def test_null_is_said_where_it_has_a_meaning() -> None:
-    assert "null takes it out again" in refusal("scoring:\n  strategies:\n    hesitation:")
+    assert "null removes it" in refusal("scoring:\n  strategies:\n    hesitation:")
     assert list(parse_study("study: x\nscoring: {strategies: {hesitation: null}}").scoring.strategies) == ["negation"]
     assert parse_study("study: x\ntasks: null").tasks is None
 

@@ -62,7 +62,7 @@ def show(
     from shift_runtime.study_files import find_study, unknown_study
     from shift_schemas.errors import UnknownThing
     from shift_study.loading import study_data
-    from shift_study.yaml_reader import write_yaml
+    from shift_study.yaml_writer import write_yaml
 
     folder = data / "studies"
     found = find_study(name, folder)

@@ -1,7 +1,7 @@
-"""Areas of interest that no gaze can hit, or hardly any: flat, crossed, thin and covered ones. Pure.
+"""Checks of areas of interest that no gaze, or little gaze, can hit: flat, crossed, thin and covered ones. Pure.
 
-Flat, crossed and thin shapes are mistakes: no stimulus looks like that. A covered area is a warning only, since gaze
-may come as AOI names, which need no shape, and areas that move can come out from under others.
+Flat, crossed and thin shapes are mistakes. A covered area gives only a warning: gaze may come as AOI names, which need
+no shape, and areas that move can leave the areas above them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ THINNEST = 1e-4
 MOSTLY = 0.9
 """Share of an area under earlier ones from which it is warned about; chosen."""
 WHOLLY = 1.0 - 1e-9
-"""The same, when nothing is left of the area but the rounding of its coordinates."""
+"""The share at which only the rounding of the coordinates is left of the area."""
 NARROW_DEG = 1.0
 """Visual angle, degrees: trackers are accurate to about 0.5 degrees on either side (Holmqvist et al. 2011, ch. 6)."""
 
@@ -63,7 +63,7 @@ def _polygon_rule(aoi: Aoi) -> str:
     corners = aoi.polygon or []
     outline = _outline(corners)
     if crossing := None if outline.is_valid else _crossing(corners):
-        first, second = (f"{_said(a)} to {_said(b)}" for a, b in crossing)
+        first, second = (f"{_corner_text(a)} to {_corner_text(b)}" for a, b in crossing)
         return f"crosses itself: the edge {first} crosses the edge {second}; list the corners in their order around it"
     width = 2 * _area(outline) / outline.length if outline.length else 0.0
     if width < 1e-12:
@@ -71,12 +71,12 @@ def _polygon_rule(aoi: Aoi) -> str:
     return _thin(f"is about {width:.2g} of the stimulus thick") if width < THINNEST else ""
 
 
-def _said(corner: Corner) -> str:
+def _corner_text(corner: Corner) -> str:
     return f"[{corner[0]:g}, {corner[1]:g}]"
 
 
 def _crossing(corners: list[list[float]]) -> tuple[tuple[Corner, Corner], tuple[Corner, Corner]] | None:
-    """The first two edges that cross inside both. Edges that only touch can belong to an area with a hole."""
+    """Return the first two edges that cross inside both. Edges that only touch can belong to an area with a hole."""
     edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
     for (a, b), (c, d) in combinations(edges, 2):
         if _turn(a, b, c) * _turn(a, b, d) < 0 and _turn(c, d, a) * _turn(c, d, b) < 0:
@@ -85,7 +85,7 @@ def _crossing(corners: list[list[float]]) -> tuple[tuple[Corner, Corner], tuple[
 
 
 def _turn(a: Corner, b: Corner, c: Corner) -> float:
-    """Above 0 where c lies on one side of the line from a to b, below 0 on the other; rounding counts as on it."""
+    """Return a number above 0 if c lies on one side of the line from a to b, below 0 on the other, 0 on it."""
     found = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
     return 0.0 if abs(found) < 1e-12 else found
 
@@ -137,7 +137,7 @@ def _overlap(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
 
 
 def _shape(aoi: Aoi) -> BaseGeometry:
-    """The area as a valid geometry; by the even-odd rule where its outline touches itself."""
+    """Return the area as a valid geometry, by the even-odd rule if its outline touches itself."""
     from shapely import box, make_valid
 
     found: BaseGeometry = make_valid(_outline(aoi.polygon) if aoi.polygon else box(*_box(aoi)))
@@ -145,7 +145,7 @@ def _shape(aoi: Aoi) -> BaseGeometry:
 
 
 def _outline(corners: Sequence[Corner]) -> Any:
-    from shapely import Polygon  # late: rectangles that do not overlap never need it
+    from shapely import Polygon  # imported late: rectangles that do not overlap never need it
 
     return Polygon(corners)
 

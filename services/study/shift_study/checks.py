@@ -1,4 +1,4 @@
-"""What is wrong or doubtful in a study that follows every rule of its values. Pure.
+"""Checks of a study whose values each follow their rule. Pure.
 
 Mistakes are refused when a study is read from a file or given at a start; recordings and sessions of earlier versions
 keep what they have. Warnings are plain sentences for the researcher; nothing is refused because of them.
@@ -22,7 +22,7 @@ from shift_study.study import Study
 
 
 class Plausible(NamedTuple):
-    """What a value measures, and the range outside of which its unit is probably wrong."""
+    """The quantity of a value, and the range outside of which its unit is probably wrong."""
 
     meaning: str
     low: float
@@ -47,16 +47,16 @@ PLAUSIBLE: dict[str, Plausible] = {
     "reward.decay": Plausible("the decay of the reward per second", 0, 10, "", 0.0),
     "decider.wait_s": Plausible("a wait in seconds", 0, 60, "ms", 1e-3),
 }
-"""Chosen wide: what lies outside was hardly meant."""
+"""Chosen wide: a value outside is probably in another unit."""
 
 
 def study_mistakes(study: Study) -> tuple[FieldError, ...]:
-    """Return what is refused when a study is read from a file or given at a start, each with the names."""
+    """Return the mistakes that are refused when a study is read from a file or given at a start."""
     return area_mistakes(study.aois)
 
 
 def study_warnings(study: Study) -> tuple[str, ...]:
-    """Return what a study probably does not mean, as sentences: its own values, then those under each condition."""
+    """Return warnings as sentences: those of the study's own values, then those of each condition."""
     found = [*area_warnings(study.aois, study.fixation), *_warnings_in_force(study)]
     for condition in study.conditions:
         more = _warnings_in_force(study_in_force(study, condition))
@@ -125,7 +125,7 @@ def _unused_parameters(study: Study) -> Iterator[str]:
 
 
 def _given(settings: LearnerSettings) -> list[str]:
-    """Parameters that were written, or, where every default is written out, that differ from it."""
+    """Return the parameters that were written; if all are written, those that differ from their default."""
     parameters = [key for key in LearnerSettings.model_fields if key != "name"]
     written = [key for key in parameters if key in settings.model_fields_set]
     if len(written) < len(parameters):
@@ -141,6 +141,4 @@ def _written(patch: Any) -> list[str]:
 
 def _no_effect(path: str, learners: list[str], key: str) -> str:
     readers = [name for name in LEARNER_SETTINGS if key in parameters_of(name)]
-    return (
-        f"{path} has no effect: {', '.join(learners)} takes no notice of it; it is a parameter of {', '.join(readers)}"
-    )
+    return f"{path} has no effect: {', '.join(learners)} does not read it; it is a parameter of {', '.join(readers)}"

@@ -1,7 +1,7 @@
-"""The study file's JSON Schema, for editors that complete and check while one writes. Pure.
+"""The study file's JSON Schema, for editors that complete and check a file during writing. Pure.
 
 ``docs/study.schema.json`` is made from it: ``python -m shift_study.json_schema > docs/study.schema.json``.
-It says of a single value what the parser says; what must fit together only the parser knows.
+It checks single values as the parser does; only the parser checks how values fit together.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ TITLE = "A study of the SHIFT mesh"
 
 
 def study_json_schema() -> Schema:
-    """The schema of a study file: everything but ``study`` may be left out, nothing unknown is taken.
+    """Return the schema of a study file: only ``study`` is required, and unknown keys are refused.
 
-    It differs from the model's own in what the parser fills in: parts of the scoring system that are left out
-    are the default's, a strategy set to null is taken out, and a condition is made of parts of a study.
+    It differs from the model's schema in what the parser adds: missing parts of the scoring system have their
+    defaults, a strategy set to null is removed, and a condition consists of parts of a study.
     """
     schema = Study.model_json_schema()
     parts = schema["$defs"]
@@ -35,7 +35,7 @@ def study_json_schema() -> Schema:
     strategies["propertyNames"] = {"pattern": name_of_strategy}
     strategies["additionalProperties"] = strategy
     strategies["properties"] = {
-        name: {**strategy, "description": f"Left out: {', '.join(default['levels'])}; null takes it out."}
+        name: {**strategy, "description": f"Left out: {', '.join(default['levels'])}; null removes it."}
         for name, default in DEFAULT_STRATEGIES.items()
     }
     fields = schema["properties"]
@@ -54,7 +54,7 @@ def _or_null(schema: Schema) -> Schema:
 
 
 def schema_text() -> str:
-    """The schema as the file holds it."""
+    """Return the text of the schema file."""
     return json.dumps(study_json_schema(), indent=2, ensure_ascii=False) + "\n"
 
 

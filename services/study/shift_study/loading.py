@@ -1,6 +1,6 @@
-"""From a study's text (YAML or JSON) to a :class:`Study`, and mistakes to sentences.
+"""Read a study: its text (YAML or JSON) becomes a :class:`Study`, or an error that lists its mistakes.
 
-A mistake gives file, line, the value, the rule and what to write instead.
+The error names the file, the line, the value, the rule and what to write instead.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from shift_study.yaml_reader import read_yaml
 
 
 def parse_study(text: str, name: str = "study") -> Study:
-    """Return the study that ``text`` spells, YAML or JSON; ``name`` is the file's, for the message.
+    """Return the study of a text in YAML or JSON; ``name`` is the file's, for the message.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def given_study(data: Any, name: str = "study") -> Study:
 def checked(study: Study, name: str, lines: Lines) -> Study:
     """Return ``study``; raise :class:`InvalidStudy` if it has an area that no gaze can hit.
 
-    Only what is new is checked so: recordings and running sessions of earlier versions have such areas.
+    Only new studies are checked: recordings and running sessions of earlier versions have such areas.
     """
     if errors := area_mistakes(study.aois):
         raise refusal(name, [Mistake(_line_of(e, lines), e.field, e.value, e.rule) for e in errors])
@@ -58,7 +58,7 @@ def _line_of(error: FieldError, lines: Lines) -> int | None:
 
 
 def study_of(data: Any, name: str = "study", lines: Lines | None = None) -> Study:
-    """The study of a plain object, checked as a whole and under each of its conditions."""
+    """Return the study of a plain object, checked as a whole and under each of its conditions."""
     study = _validated(data, name, lines or {}, ())
     found = [m for condition in study.conditions for m in _mistakes_under(study, condition, lines or {})]
     if found:
@@ -72,7 +72,7 @@ def _mistakes_under(study: Study, condition: str, lines: Lines) -> list[Mistake]
 
 
 def study_in_force(study: Study, condition: str | None) -> Study:
-    """The study under one of its conditions; ``None`` is the study's own values.
+    """Return the study under one of its conditions; None stands for the study's own values.
 
     Raises :class:`InvalidStudy` for a condition that the study does not have.
     """
@@ -89,31 +89,31 @@ def study_in_force(study: Study, condition: str | None) -> Study:
 
 
 def patched(study: Study, patch: Any) -> Study:
-    """The study after a JSON merge patch (RFC 7386), whether or not it may change now."""
+    """Return the study after a JSON merge patch (RFC 7386); the caller checks whether it may change now."""
     return _validated(_merged(study, patch), "config", {}, ())
 
 
 def study_data(study: Study) -> dict[str, Any]:
-    """The study as a plain object, every default written out; ``study_of`` takes it back."""
+    """Return the study as a plain object with every default; :func:`study_of` is the inverse."""
     data: dict[str, Any] = study.model_dump(mode="json", exclude_none=True)
     strategies = data["scoring"]["strategies"]
-    strategies.update({name: None for name in DEFAULT_STRATEGIES if name not in strategies})  # stay taken out
+    strategies.update({name: None for name in DEFAULT_STRATEGIES if name not in strategies})  # they stay removed
     return data
 
 
 def study_json(study: Study) -> str:
-    """The study as one JSON string, as ``config`` facts carry it."""
+    """Return the study as one JSON string, as ``config`` facts carry it."""
     return json.dumps(study_data(study), ensure_ascii=False, separators=(",", ":"))
 
 
 @lru_cache(maxsize=128)
 def study_from_json(text: str) -> Study:
-    """The inverse of :func:`study_json`, remembered: a study in force is read at every message of its session."""
+    """Return the study of a ``config`` fact; it is cached, because every message of a session needs it."""
     return study_of(as_recorded(json.loads(text)))
 
 
 def as_recorded(data: Any) -> Any:
-    """Return a study that was written out whole, with the rules of its time where it lacks a value of today.
+    """Return the data of a recorded study; a value that its version did not have gets that version's rule.
 
     Version 0.1 had no ``attention.minimum_dwell_s``: the gaze class held from the first sample on an AOI.
     """
@@ -127,19 +127,19 @@ def _in_force(study: Study, condition: str, name: str, lines: Lines) -> Study:
 
 
 def _merged(study: Study, patch: Any) -> Any:
-    """The study's data under a merge patch. A strategy set to null is taken out, with its column of the table."""
+    """Return the study's data under a merge patch. A strategy set to null is removed with its column of the table."""
     merged = merge_patch(study_data(study), patch)
-    for name in _taken_out(patch):
+    for name in _removed_strategies(patch):
         scoring = merged["scoring"]
         if name in DEFAULT_STRATEGIES:
-            scoring["strategies"][name] = None  # left out, it would be the default's
+            scoring["strategies"][name] = None  # without this entry it would be the default's
         if isinstance(scoring.get("table"), dict):
             column = {part: {row: {name: None} for row in rows} for part, rows in DEFAULT_TABLE.items()}
             scoring["table"] = merge_patch(scoring["table"], column)
     return merged
 
 
-def _taken_out(patch: Any) -> list[str]:
+def _removed_strategies(patch: Any) -> list[str]:
     for key in ("scoring", "strategies"):
         patch = patch.get(key) if isinstance(patch, dict) else None
     return [name for name, given in patch.items() if given is None] if isinstance(patch, dict) else []
@@ -153,10 +153,10 @@ def _validated(data: Any, name: str, lines: Lines, under: Path) -> Study:
 
 
 def _read(data: Any, lines: Lines, under: Path) -> Study | list[Mistake]:
-    """The study of a plain object, or what is wrong with it."""
+    """Return the study of a plain object, or its mistakes."""
     try:
         return Study.model_validate_json(json.dumps(data))
     except ValidationError as e:
         return [m for found in e.errors(include_url=False)[:MISTAKES] for m in mistakes_of(found, lines, under)]
     except (RecursionError, ValueError, TypeError):
-        return [Mistake(None, "", "", "it is nested too deep or holds what JSON cannot say")]
+        return [Mistake(None, "", "", "it is nested too deep, or it holds a value that JSON does not have")]

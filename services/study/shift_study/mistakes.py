@@ -1,62 +1,56 @@
-"""What is wrong in a study as sentences: the value, the rule, and what to write instead. Pure."""
+"""Mistakes in a study: line, field, value and rule, and the error that lists them. Pure."""
 
 from __future__ import annotations
 
-import json
-import re
 from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from shift_schemas.errors import FieldError, InvalidStudy, shorten
-from shift_schemas.ids import ID_PATTERN, ID_RULE, propose_id
-from shift_schemas.suggestions import did_you_mean, level_like, nearest
 
-from shift_study.shape import CONDITIONS, Path, annotation_at, default_at, dotted, keys_at, kind_at
-from shift_study.units import converted, unit_of
-from shift_study.yaml_numbers import core_number
+from shift_study.rules import rule_of
+from shift_study.shape import Path, annotation_at, dotted, keys_at
 
 Lines = dict[Path, int]
 RULE_LENGTH = 400
-"""How much of a rule is said: rules name what is there, and that can be as long as what was sent."""
+"""Characters of a rule that are kept: a rule names the known values, and those can be long."""
 MISTAKES = 20
-"""So many are said at once."""
-LEVEL_RULE = "1 to 32 lower-case letters, digits and _, beginning with a letter"
+"""How many mistakes an error lists."""
 
 
 class Mistake(NamedTuple):
-    """One mistake: the line of the file, if there is one, and the field, empty where it is the whole study's."""
+    """One mistake; ``line`` is None without a file, and ``field`` is empty for a mistake of the whole study."""
 
     line: int | None
     field: str
     value: str
     rule: str
 
-    def said(self, name: str) -> str:
+    def sentence(self, name: str) -> str:
         """Return the sentence; ``name`` is the file's."""
         where = f"{name}:{self.line}" if self.line else name
         return ": ".join(part for part in (where, self.field, self.rule) if part)
 
     @property
     def error(self) -> FieldError:
-        """The mistake as it travels, without its line."""
+        """The mistake as errors carry it, without its line."""
         return FieldError(field=self.field or "study", value=self.value, rule=self.rule)
 
 
 def mistake_at(line: int | None, path: Path, value: object, rule: str) -> Mistake:
-    """Return a mistake with its parts cut to what is said back."""
+    """Return a mistake with its value and rule shortened."""
     rule = rule if len(rule) <= RULE_LENGTH else rule[: RULE_LENGTH - 1] + "…"
     return Mistake(line, shorten(dotted(path)), shorten(value), rule)
 
 
 def refusal(name: str, mistakes: Iterable[Mistake]) -> InvalidStudy:
-    """Return the error that says the mistakes in the order of their lines; ``name`` is the file's."""
-    said = sorted(dict.fromkeys(mistakes), key=lambda m: m.line or 0)[:MISTAKES]
-    sentences = tuple(m.said(name) for m in said)
-    return InvalidStudy("; ".join(sentences), tuple(m.error for m in said), sentences)
+    """Return the error that lists the mistakes in the order of their lines; ``name`` is the file's."""
+    listed = sorted(dict.fromkeys(mistakes), key=lambda m: m.line or 0)[:MISTAKES]
+    sentences = tuple(m.sentence(name) for m in listed)
+    return InvalidStudy("; ".join(sentences), tuple(m.error for m in listed), sentences)
 
 
 def mistakes_of(found: Any, lines: Lines, under: Path) -> Iterator[Mistake]:
-    """Yield the mistakes in one complaint of pydantic's about what stands ``under`` a condition, or at the top."""
+    """Yield the mistakes in one error of pydantic; ``under`` is the path of a condition, or empty."""
     path: Path = tuple(p for p in found["loc"] if p != "[key]")
     if found["type"] == "table_cells":
         for cell, value, rule in found["ctx"]["cells"]:
@@ -64,7 +58,7 @@ def mistakes_of(found: Any, lines: Lines, under: Path) -> Iterator[Mistake]:
         return
     path = path or _named_first(found["msg"])
     value = "" if found["type"] == "missing" else shorten(found["input"])
-    yield _placed(path, value, _rule(found, path, value), lines, under)
+    yield _placed(path, value, rule_of(found, path, value), lines, under)
 
 
 def _placed(path: Path, value: str, rule: str, lines: Lines, under: Path) -> Mistake:
@@ -74,185 +68,6 @@ def _placed(path: Path, value: str, rule: str, lines: Lines, under: Path) -> Mis
 
 
 def _named_first(message: str) -> Path:
-    """A mistake in how parts fit together is the whole study's; its message begins with the part to change."""
+    """Return the path of the part that a mistake of the whole study names first: the part to change."""
     path = tuple(message.removeprefix("Value error, ").split(" ", 1)[0].split("."))
     return path if path[0] in keys_at(()) and annotation_at(path) is not None else ()
-
-
-# --- rules ---
-
-
-def _rule(found: Any, path: Path, value: str) -> str:
-    kind, given = found["type"], found["input"]
-    if kind == "missing":
-        return "it is missing; write it"
-    if kind == "extra_forbidden":
-        return _key_rule(path, given)
-    if kind == "value_error":
-        message = str(found["msg"]).removeprefix("Value error, ")
-        return message if isinstance(given, dict) else f"{value} is not valid: {message}"
-    if kind == "string_pattern_mismatch":
-        return _word_rule(found["ctx"]["pattern"], given)
-    if kind == "literal_error":
-        choices = get_args(annotation_at(path))
-        return f"{value!r} is not valid; write one of {', '.join(choices)}{did_you_mean(given, choices)}"
-    return f"{value!r} is not valid: {_plain_rule(found, path, given)}"
-
-
-def _plain_rule(found: Any, path: Path, given: Any) -> str:
-    expected = kind_at(path)
-    if expected == "number" and isinstance(given, str):
-        return _number_rule(given, path)
-    if expected == "boolean":
-        return _boolean_rule(given)
-    if expected == "text" and _is_number(given):
-        return f"it is not text; write {json.dumps(str(given))} in quotes"
-    if expected == "text" and not isinstance(given, str):
-        return "write a word or a text"
-    if found["type"] in ("int_type", "int_from_float") and isinstance(given, float) and given.is_integer():
-        return f"it must be a whole number; write {int(given)}"
-    if expected == "list" and not isinstance(given, list):
-        return _list_rule(path, given)
-    if found["type"] in ("model_type", "model_attributes_type", "dict_type"):
-        return _mapping_rule(path, given)
-    if found["type"] in ("too_long", "too_short"):
-        return _length_rule(found, path)
-    return _range_rule(found, path, given)
-
-
-def _key_rule(path: Path, given: Any) -> str:
-    key, known = str(path[-1]), keys_at(path[:-1])
-    said = f"{shorten(key)!r} is not a key here"
-    if unit := converted(key, given, known):
-        return f"{said}; {unit}"
-    near = nearest(key, known)
-    if near is None:
-        return f"{said}; write one of {', '.join(known)}"
-    return f"{said}; write {near!r}" + (f", in {unit_of(near)}" if unit_of(near) else "")
-
-
-def _word_rule(pattern: str, given: str) -> str:
-    rule, like = (ID_RULE, propose_id) if pattern == ID_PATTERN else (LEVEL_RULE, level_like)
-    what = "an id" if pattern == ID_PATTERN else "a level or strategy name"
-    proposal = f"; write for example {like(given)!r}" if like(given) else ""
-    return f"{shorten(given)!r} is not {what}: {rule}{proposal}"
-
-
-def _number_rule(text: str, path: Path) -> str:
-    """What to write instead of ``text`` where a number is expected."""
-    bare = text.strip().replace("−", "-")
-    if core_number(bare) is not None:
-        return f"it is text and a number is expected; write {bare} without quotes"
-    if found := re.fullmatch(r"([-+]?[0-9.,]+)\s*%", bare):
-        share = _point(found[1])
-        return f"write the share of one without the sign, {share / 100:g}" if share is not None else _NUMBER
-    if (joined := core_number(bare.replace("_", ""))) is not None:
-        return f"a number has no _; write {joined}"
-    if found := re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*/\s*([0-9]+)", bare):
-        return f"a fraction is written out; write {float(found[1]) / (int(found[2]) or 1):.6g}"
-    if re.fullmatch(r"[-+]?[0-9]+,[0-9]+", bare):
-        return f"a number has a point, not a comma; write {bare.replace(',', '.')}"
-    if re.fullmatch(r"[0-9]+(:[0-9]+)+", bare):
-        return f"a number has no colon; write one number{_in_unit(path)}"
-    if found := re.fullmatch(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*([A-Za-zµ°]+)", bare):
-        return f"write the number alone, {found[1]}{_in_unit(path)}"
-    return _NUMBER + _default(path)
-
-
-_NUMBER = "a number is expected"
-
-
-def _in_unit(path: Path) -> str:
-    unit = unit_of(str(path[-1])) if path else None
-    return f", in {unit}" if unit else ""
-
-
-def _point(text: str) -> float | None:
-    number = core_number(text.replace(",", "."))
-    return None if number is None else float(number)
-
-
-_TRUE, _FALSE = {"true", "yes", "on", "y", "1"}, {"false", "no", "off", "n", "0"}
-
-
-def _boolean_rule(given: Any) -> str:
-    word = str(given).strip().lower()
-    if word in _TRUE | _FALSE:
-        return f"write {'true' if word in _TRUE else 'false'}, without quotes"
-    return "write true or false"
-
-
-def _is_number(given: Any) -> bool:
-    return isinstance(given, (int, float)) and not isinstance(given, bool)
-
-
-def _list_rule(path: Path, given: Any) -> str:
-    if path[-1:] == ("aois",) and isinstance(given, dict):
-        name = next(iter(given), "cup")
-        return f"it is a list; write - {{name: {shorten(str(name))}, rectangle: [left, top, right, bottom]}}"
-    item = f"[{given}]" if isinstance(given, (str, int, float)) and len(str(given)) < 60 else "[first, second]"
-    return f"it is a list; write {item}"
-
-
-def _mapping_rule(path: Path, given: Any) -> str:
-    if len(path) == 2 and path[0] == "aois":
-        name = shorten(given) if isinstance(given, str) else "cup"
-        return f"an area has a name and a shape; write {{name: {name}, rectangle: [left, top, right, bottom]}}"
-    known = keys_at(path)
-    return "it has entries of its own; write " + (
-        f"{{{known[0]}: ...}}, of {', '.join(known)}" if known else "{key: value}"
-    )
-
-
-_SHAPES = {
-    "rectangle": "left, top, right, bottom",
-    "polygon": "the corners, [x, y] each",
-}
-
-
-def _length_rule(found: Any, path: Path) -> str:
-    context = found["ctx"]
-    least, most = context.get("min_length"), context.get("max_length")
-    shape = next((p for p in reversed(path) if p in _SHAPES), None)
-    fixed = {"rectangle": 4, "polygon": 2 if isinstance(path[-1], int) else None}.get(str(shape)) if shape else None
-    bound = str(fixed or "") or (f"at least {least}" if least is not None else f"at most {most}")
-    said = f"it has {context['actual_length']} entries and needs {bound}"
-    if shape is not None:
-        corner = shape == "polygon" and isinstance(path[-1], int)
-        return f"{said}: {'x, y' if corner else _SHAPES[str(shape)]}; write decimals with a point, 0.5 and not 0,5"
-    return f"{said}; write more, or remove the key" if least is not None else f"{said}; write fewer"
-
-
-_BOUNDS = {"greater_than_equal": ("ge", "at least"), "greater_than": ("gt", "above"),
-           "less_than_equal": ("le", "at most"), "less_than": ("lt", "below")}  # fmt: skip
-
-
-def _range_rule(found: Any, path: Path, given: Any) -> str:
-    if found["type"] in _BOUNDS:
-        key, words = _BOUNDS[found["type"]]
-        said = f"it must be {words} {found['ctx'][key]:g}"
-        if found["ctx"][key] == 1 and _is_number(given):
-            return f"{said}; {_share_rule(path, given)}{_default(path)}"
-        return said + _default(path)
-    message = str(found["msg"])
-    return f"{message[0].lower()}{message[1:]}{_default(path)}"
-
-
-def _share_rule(path: Path, given: float) -> str:
-    """What to write instead of a number above 1 where a share of one is expected."""
-    percent = f"{given:g} % is written {given / 100:g}" if 2 <= given <= 100 else ""
-    shape = next((i for i, p in enumerate(path) if p in _SHAPES), None)
-    if shape is None:
-        return percent or "it is a share of one"
-    side = "width" if int(path[-1]) % 2 == 0 else "height"
-    pixels = f"{given:g} pixels are {given:g} divided by the stimulus' {side} in pixels" if given >= 2 else ""
-    comma = f"0,{given} is written 0.{given}" if isinstance(given, int) and 1 < given < 10 else ""
-    meant = ", ".join(part for part in (comma, percent, pixels) if part)
-    return f"it is a share of the stimulus' {side}" + (f": {meant}" if meant else "")
-
-
-def _default(path: Path) -> str:
-    if path[:1] == (CONDITIONS,):
-        path = path[2:]
-    default = default_at(path)
-    return "" if default in (None, "") else f"; write for example the default, {json.dumps(default)}"

@@ -16,7 +16,7 @@ from shift_study.patching import merge_patch
 
 
 class StrategySettings(StudyPart):
-    """One scaffolding strategy: a column of the scoring table and the levels it is ranked into."""
+    """One scaffolding strategy: its column of the scoring table is ranked into its levels."""
 
     weight: NonNegative = Field(default=1.0, description="S_weight; 1 leaves the score as it is.")
     levels: list[Level] = Field(min_length=2, max_length=8, description="From least to most, ids in lower case.")

@@ -1,7 +1,7 @@
-"""What stands where in a study file: the type, the keys and the default that the study's models give a path. Pure.
+"""The shape of a study file: the type, the keys and the default at each path, from the study's models. Pure.
 
-A path is the keys and list indexes from the top: ``("aois", 0, "name")``. A condition is made of parts of a study,
-so what stands under ``("conditions", NAME)`` has the shape of the study itself.
+A path is the keys and list indexes from the top: ``("aois", 0, "name")``. A condition consists of parts of a study,
+so that the shape below ``("conditions", NAME)`` is that of the study itself.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def dotted(path: Iterable[str | int]) -> str:
 
 
 def kind_at(path: Path) -> Kind:
-    """Return what is expected at ``path``; ``any`` where the study has no such place."""
+    """Return the kind of value at ``path``, or ``any`` if the study has no such path."""
     annotation = annotation_at(path)
     if annotation is None or annotation is Any:
         return "any"
@@ -42,7 +42,7 @@ def kind_at(path: Path) -> Kind:
 
 
 def annotation_at(path: Path) -> Any:
-    """Return the type that the study's models give ``path``, without ``None`` and constraints; ``None``: no place."""
+    """Return the type at ``path`` without ``None`` and constraints, or None if the study has no such path."""
     here: Any = Study
     if len(path) >= 2 and path[0] == CONDITIONS:
         here, path = (Study, path[2:]) if len(path) > 2 else (dict[str, Any], ())
@@ -52,13 +52,13 @@ def annotation_at(path: Path) -> Any:
 
 
 def keys_at(path: Path) -> tuple[str, ...]:
-    """Return the keys that can stand in the mapping at ``path``, sorted; none where any key can."""
+    """Return the sorted keys of the mapping at ``path``; the result is empty if any key is allowed."""
     here = annotation_at(path)
     return tuple(sorted(here.model_fields)) if isinstance(here, type) and issubclass(here, BaseModel) else ()
 
 
 def default_at(path: Path) -> Any:
-    """Return the default of a single value, ``None`` where there is no such one."""
+    """Return the default of a single value, or None if it has none."""
     here: Any = _defaults()
     for part in path:
         try:
@@ -82,7 +82,7 @@ def _inside(annotation: Any, part: str | int) -> Any:
 
 
 def _bare(annotation: Any) -> Any:
-    """The type without what is wrapped around it: ``Annotated[X, ...]`` and ``X | None`` are X."""
+    """Return X for ``Annotated[X, ...]`` and for ``X | None``."""
     while True:
         origin = get_origin(annotation)
         if origin is Annotated:

@@ -12,17 +12,17 @@ _UNITS: dict[str, tuple[str, float, str]] = {
     "sec": ("time", 1.0, "s"), "min": ("time", 60.0, "minutes"),
     "deg": ("angle", 1.0, "degrees"), "rad": ("angle", 57.29577951308232, "rad"), "px": ("pixels", 1.0, "pixels"),
 }  # fmt: skip
-"""By suffix: what is measured, how many of its first unit (cm, s, degrees) one is, and its name."""
+"""For each suffix: the quantity, the factor to its first unit (cm, s, degrees), and the unit's name."""
 
 
 def unit_of(key: str) -> str | None:
-    """Return the name of the unit that a key ends with, ``None`` where it names none."""
+    """Return the name of the unit at the end of a key, or None if it has none."""
     unit = _UNITS.get(key.rpartition("_")[2]) if "_" in key else None
     return unit[2] if unit else None
 
 
 def converted(key: str, given: Any, known: Iterable[str]) -> str | None:
-    """Return what to write for a key that differs from a known one in its unit only; ``None``: it does not.
+    """Return what to write for a key that differs from a known key only in its unit; None for any other key.
 
     ``distance_mm: 650`` gives "write 'distance_cm', in cm: 650 mm are 65 cm".
     """

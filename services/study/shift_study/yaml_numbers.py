@@ -1,4 +1,6 @@
-"""Plain scalars as the core schema of YAML 1.2 reads them (YAML 1.2.2, section 10.3.2). Pure.
+"""Plain scalars by the core schema of YAML 1.2 (YAML 1.2.2, section 10.3.2). Pure.
+
+``ruamel.yaml`` is not used here: its resolver takes ``1_000`` as a number, which the core schema does not.
 
 ``010`` is ten; ``0o10`` and ``0x8`` are eight; ``yes``, ``no``, ``on``, ``off``, ``1_000``, ``1:05`` and dates are
 text.
@@ -21,7 +23,7 @@ _WORDS: dict[str, bool | None] = {
 
 
 def core_value(text: str) -> str | int | float | bool | None:
-    """Return what a plain scalar stands for."""
+    """Return the value of a plain scalar."""
     if text in _WORDS:
         return _WORDS[text]
     number = core_number(text)
@@ -29,7 +31,7 @@ def core_value(text: str) -> str | int | float | bool | None:
 
 
 def core_number(text: str) -> int | float | None:
-    """Return the number that ``text`` spells, ``None`` where it spells none."""
+    """Return the number that ``text`` is, or None if it is not a number."""
     try:
         if _INTEGER.fullmatch(text):
             return int(text)

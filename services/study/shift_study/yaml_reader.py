@@ -1,37 +1,31 @@
-"""A study's YAML as plain data: keys and ids as written, each number and word as its place expects it. Pure.
+"""A study's YAML as plain data: keys and ids as written, numbers and words as their place expects them. Pure.
 
-``ruamel.yaml`` parses (YAML 1.2) and gives positions; the values are read here, because what ``on``, ``01`` or
-``2024`` stands for depends on the place. Where the study has an id, a word or a text, it stays as written. Where it
-has a number or a boolean, the core schema of YAML 1.2 counts. Keys are always text. JSON is read in the same way.
+``ruamel.yaml`` parses YAML 1.2 and gives the positions. The values are read here, because the meaning of ``on``, ``01``
+or ``2024`` depends on the place: an id, a word or a text stays as written, and a number or a boolean follows the core
+schema of YAML 1.2. Keys are always text. JSON is read in the same way.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
-from io import StringIO
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
-from ruamel.yaml.representer import SafeRepresenter
 from shift_schemas.errors import shorten
 
 from shift_study.mistakes import Lines, Mistake, mistake_at, refusal
 from shift_study.shape import CONDITIONS, Path, dotted, kind_at
 from shift_study.yaml_numbers import core_value
+from shift_study.yaml_syntax import DEEPEST, compose
 
 LARGEST = 50_000
-"""Entries of a study file, aliases counted each time: a few lines of YAML can spell billions of them."""
-DEEPEST = 32
-"""Levels of nesting; a study has seven."""
+"""Entries of a study file, aliases counted each time: a few lines of YAML can expand to billions of entries."""
 MERGE = "<<"
 _TAGS = frozenset(
     f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null", "map", "seq", "merge", "timestamp")
 )
-"""Tags that repeat what the place says already."""
+"""Tags without an effect: the place decides the type."""
 _DIGITS = re.compile(r"[0-9]+")
 
 
@@ -43,7 +37,7 @@ def read_yaml(text: str, name: str) -> tuple[Any, Lines]:
     InvalidStudy
         The text is not YAML, a key is given twice, or it is too large; with one sentence per mistake.
     """
-    node = _composed(text.removeprefix("\ufeff"), name)
+    node = compose(text.removeprefix("\ufeff"), name)
     if not isinstance(node, MappingNode):
         what = "the file is empty" if node is None else "this is a list or a text"
         raise refusal(name, [Mistake(1, "", "", f"a study is a mapping and {what}; begin with 'study: my-study'")])
@@ -58,11 +52,11 @@ def read_yaml(text: str, name: str) -> tuple[Any, Lines]:
 
 
 class _TooMuch(ValueError):
-    """The file spells more than a study can be."""
+    """The file holds more than a study can have."""
 
 
 class _Reading:
-    """One walk over the nodes. What is wrong is collected, so that every mistake is said at once."""
+    """One walk over the nodes. It collects every mistake, so that the error lists all of them."""
 
     def __init__(self) -> None:
         self.lines: Lines = {}
@@ -109,7 +103,7 @@ class _Reading:
         return data
 
     def _pairs(self, node: MappingNode, path: Path, depth: int) -> Iterator[tuple[Node, Node, bool]]:
-        """Keys and values, those of merged mappings (``<<: *base``) first; what stands here overrides them."""
+        """Yield keys, values and whether they are merged (``<<: *base``); merged ones come first and are overridden."""
         self._count(path)
         if depth > DEEPEST:
             raise _TooMuch("an anchor merges itself; write the values out")
@@ -140,15 +134,15 @@ class _Reading:
         return text if kind == "text" and value is not None else value
 
     def _nothing(self, node: ScalarNode, path: Path) -> Any:
-        """Read what was left empty: a part with nothing below it has its defaults; a value must be written."""
+        """Read an empty entry: an empty part has its defaults; an empty value is a mistake."""
         in_condition = len(path) > 2 and path[0] == CONDITIONS
         strategy = path[:-1] == ("scoring", "strategies")
         kind = kind_at(path)
         if kind == "any":
-            return None  # an unknown key: that is said
+            return None  # an unknown key is reported elsewhere
         if kind == "mapping" and isinstance(path[-1], str) and not in_condition and not strategy:
             return {}
-        null = "; null takes it out again" if in_condition or strategy else ""
+        null = "; null removes it" if in_condition or strategy else ""
         rule = f"nothing is written here; write a value, or remove the key{null}"
         self.mistakes.append(mistake_at(self.lines.get(path, _line(node)), path, "", rule))
         return None
@@ -183,101 +177,7 @@ def _is_merge(key: Node) -> bool:
 
 
 def _joined(text: str) -> str:
-    """The text with surrogate pairs joined, as JSON writes characters beyond the basic plane."""
+    """Return the text with surrogate pairs joined: JSON writes characters beyond the basic plane as pairs."""
     if not any("\ud800" <= c <= "\udfff" for c in text):
         return text
     return text.encode("utf-16", "surrogatepass").decode("utf-16", "replace")
-
-
-# --- syntax ---
-
-
-def _composed(text: str, name: str) -> Node | None:
-    yaml = YAML(typ="safe", pure=True)
-    yaml.max_depth = 2 * DEEPEST
-    yaml.composer.warn_double_anchors = False
-    try:
-        found: Node | None = yaml.compose(_without_tabs(text))
-    except (YAMLError, RecursionError, ValueError) as e:
-        raise refusal(name, [Mistake(_line_of(e, text), "", "", _syntax_rule(e))]) from e
-    return found
-
-
-def _without_tabs(text: str) -> str:
-    """JSON may be indented with tabs, YAML not. A string of JSON cannot hold a raw tab."""
-    if "\t" not in text or not text.lstrip().startswith("{"):
-        return text
-    try:
-        json.loads(text)
-    except (ValueError, RecursionError):
-        return text
-    return text.replace("\t", " ")
-
-
-def _line_of(error: Exception, text: str) -> int | None:
-    mark = getattr(error, "problem_mark", None)
-    if mark is not None:
-        return int(mark.line) + 1
-    position = getattr(error, "position", None)
-    return text.count("\n", 0, position) + 1 if isinstance(position, int) else None
-
-
-_RULES = tuple(
-    (re.compile(problem), sentence)
-    for problem, sentence in (
-        (r"found character '\\t'", "a tab stands where YAML takes spaces only; write spaces, two for each level"),
-        ("found character '(.)'", "a value cannot begin with {0}; put it into quotes"),
-        (
-            "mapping values are not allowed",
-            "': ' stands where no key can, or the line is indented too far; put a value that contains ': ' into quotes",
-        ),
-        ("undefined alias '(.*)'", "*{0} names no anchor; write &{0} at the value that it repeats"),
-        ("expected ',' or '(.)'.*stream end", "the bracket that opens in line {line} is not closed; write {0}"),
-        ("end of stream", "the quotation mark that opens in line {line} is not closed"),
-        (
-            "expected <block end>",
-            "the line does not fit into what begins in line {line}; begin entries that belong together in one column",
-        ),
-        ("special characters are not allowed", "it has a character that no text has; save it again as text in UTF-8"),
-    )
-)
-"""What the parser complains of, and the sentence for it."""
-
-
-def _syntax_rule(error: Exception) -> str:
-    if isinstance(error, RecursionError) or type(error).__name__ == "MaxDepthExceededError":
-        return "this is not YAML: it is nested too deep"
-    problem = getattr(error, "problem", None) or getattr(error, "reason", None) or str(error)
-    if "found another document" in problem:
-        return "--- begins a second study; a file holds one, so put the other into a file of its own"
-    begun = getattr(error, "context_mark", None)
-    for pattern, sentence in _RULES:
-        if found := pattern.search(problem):
-            line = int(begun.line) + 1 if begun is not None else "?"
-            return f"this is not YAML: {sentence.format(*found.groups(), line=line)}"
-    return f"this is not YAML: {shorten(problem)}"
-
-
-# --- writing ---
-
-
-class _Readable(SafeRepresenter):
-    """Writes short rows and lists of plain values in one line, and everything else line by line."""
-
-    def represent_mapping(self, tag: Any, mapping: Any, flow_style: Any = None) -> Any:
-        """Choose the style by what is in the mapping."""
-        items = dict(mapping)
-        short = len(items) <= 3 and not any(isinstance(value, (dict, list)) for value in items.values())
-        return super().represent_mapping(tag, items, flow_style=short)
-
-
-def write_yaml(data: Any) -> str:
-    """Return plain data as a study file; :func:`read_yaml` takes it back."""
-    yaml = YAML(typ="safe", pure=True)
-    yaml.Representer = _Readable
-    yaml.default_flow_style = None  # lists of plain values stand in one line
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]  # the order of strategies counts
-    yaml.width = 110
-    text = StringIO()
-    yaml.dump(data, text)
-    return text.getvalue()
