@@ -30,7 +30,7 @@ names = st.text(string.ascii_lowercase, max_size=12).map(lambda name: f"{name}_{
 
 
 def declared(name: str, owner: str, method: str, status: int) -> type[Command]:
-    """A command with a route, as a new message file would declare it."""
+    """Return a new command with a route, declared as a message file would declare it."""
 
     class Wave(Command):
         """Wave at somebody."""
@@ -71,13 +71,13 @@ async def test_each_route_is_in_the_application(mesh: Mesh, kind: type[Command])
 
 
 class FakeMesh:
-    """A client of the mesh that answers every command, and keeps it."""
+    """A client of the mesh that answers every command and remembers it."""
 
     def __init__(self) -> None:
         self.commands: list[Command] = []
 
     async def command(self, command: Command, wait_s: float) -> Answer:
-        """Answer."""
+        """Remember the command and answer it."""
         self.commands.append(command)
         return Answer(owner=command.owner, seq=1, result={"waved": True})
 
@@ -110,7 +110,7 @@ async def test_declared_command_is_carried_out_with_the_id_that_was_given(name: 
 
 
 def new_session_view() -> SessionView:
-    """The view of a session of which nothing but its beginning is known."""
+    """Return the view of a session that has just begun."""
     now = Stamp.of(0)
     fact = Session(session="s1", stamp=now, participant="P01", study="x", seed=1, state="live", started=now)
     return SessionView(fact)

@@ -1,4 +1,4 @@
-"""A data folder that was copied while a mesh used it: journals that do not fit together are named, and nothing ends."""
+"""A data folder that was copied while a mesh used it: the error names the journals that do not fit together."""
 
 from __future__ import annotations
 

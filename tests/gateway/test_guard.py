@@ -1,4 +1,4 @@
-"""Browsers at the door: hosts, origins, CORS, HEAD, OPTIONS, pages without another host."""
+"""Browsers as clients: hosts, origins, CORS, HEAD, OPTIONS, and pages without another host."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LAB, EVIL = "https://lab.example.org", "http://evil.example"
 
 @pytest.fixture
 async def lab(tmp_path: Path, anyio_backend: str) -> AsyncIterator[httpx.AsyncClient]:
-    """A gateway that pages of ``LAB`` may use; no service runs behind it."""
+    """Yield a client of a gateway that pages of ``LAB`` may use, without any other service."""
 
     async def open_bus() -> MemoryBus:
         return MemoryBus(Hub())
@@ -40,7 +40,7 @@ async def lab(tmp_path: Path, anyio_backend: str) -> AsyncIterator[httpx.AsyncCl
 # --- hosts and origins ---
 
 
-async def test_a_page_of_another_origin_changes_nothing(mesh: Mesh) -> None:
+async def test_page_of_another_origin_changes_nothing(mesh: Mesh) -> None:
     session = await mesh.session()
     before = await session.read()
     plain = {"Origin": EVIL, "Content-Type": "text/plain"}
@@ -54,19 +54,19 @@ async def test_a_page_of_another_origin_changes_nothing(mesh: Mesh) -> None:
 
 
 @pytest.mark.parametrize("path", ["/", "/docs", "/healthz", "/readyz", "/metrics", "/nowhere", "/v1/sessions"])
-async def test_a_foreign_host_is_refused_on_every_path(mesh: Mesh, path: str) -> None:
+async def test_foreign_host_is_refused_on_every_path(mesh: Mesh, path: str) -> None:
     found = problem(await mesh.ask("GET", path, headers={"Host": "evil.example:80"}), 421)
     assert "SHIFT_HOSTS=evil.example" in found["detail"]
 
 
-async def test_a_refusal_gives_no_cors_headers(mesh: Mesh) -> None:
+async def test_refusal_has_no_cors_headers(mesh: Mesh) -> None:
     preflight = {"Origin": EVIL, "Access-Control-Request-Method": "POST"}
     answer = await mesh.ask("OPTIONS", "/v1/sessions", headers=preflight)
     problem(answer, 403)
     assert not [name for name in answer.headers if name.startswith("access-control")]
 
 
-async def test_a_websocket_of_a_foreign_page_is_not_opened(mesh: Mesh) -> None:
+async def test_websocket_of_a_foreign_page_is_refused(mesh: Mesh) -> None:
     session = await mesh.session()
     with served(mesh.app) as port:
         address = f"ws://127.0.0.1:{port}{session.path('gaze')}"
@@ -84,7 +84,7 @@ async def test_a_websocket_of_a_foreign_page_is_not_opened(mesh: Mesh) -> None:
 # --- CORS ---
 
 
-async def test_a_named_origin_gets_its_preflight_answered(lab: httpx.AsyncClient) -> None:
+async def test_preflight_of_a_named_origin_is_answered(lab: httpx.AsyncClient) -> None:
     asks = {"Access-Control-Request-Method": "PATCH", "Access-Control-Request-Headers": "content-type, authorization"}
     answer = await lab.options("/v1/sessions/s1/config", headers={"Origin": LAB, **asks})
     assert answer.status_code == 200
@@ -126,7 +126,7 @@ async def test_head_is_answered_as_get_without_a_body(mesh: Mesh) -> None:
 
 
 async def heads_are_gets_without_a_body(client: httpx.AsyncClient, recording: str) -> None:
-    """Compare HEAD and GET through the real server; a part of the recording too."""
+    """Compare HEAD and GET through the real server, also for a part of a recording."""
     for path in (*GETS[:6], "/healthz", recording):
         found, whole = await client.head(path), await client.get(path)
         assert (found.status_code, found.content) == (200, b"")
@@ -149,7 +149,7 @@ async def test_head_of_reads_and_of_the_endless_stream_ends(mesh: Mesh) -> None:
     [("/v1/sessions", "GET, HEAD, OPTIONS, POST"), ("/v1/sessions/s1/config", "GET, HEAD, OPTIONS, PATCH"),
      ("/v1/sessions/s1/decisions", "OPTIONS, POST"), ("/healthz", "GET, HEAD, OPTIONS")],
 )  # fmt: skip
-async def test_the_methods_of_a_path_are_named(mesh: Mesh, path: str, allowed: str) -> None:
+async def test_methods_of_a_path_are_named(mesh: Mesh, path: str, allowed: str) -> None:
     answer = await mesh.ask("OPTIONS", path)
     assert (answer.status_code, answer.headers["allow"], answer.content) == (204, allowed, b"")
     refused = await mesh.ask("PUT", path, {})
@@ -164,7 +164,7 @@ async def test_the_methods_of_a_path_are_named(mesh: Mesh, path: str, allowed: s
      ("/redoc", "at /docs")],
 )  # fmt: skip
 @pytest.mark.parametrize("method", ["GET", "POST"])
-async def test_a_path_that_is_not_there_is_not_redirected_and_helps(
+async def test_unknown_path_is_not_redirected_and_gets_a_proposal(
     mesh: Mesh, method: str, path: str, says: str
 ) -> None:
     assert says in problem(await mesh.ask(method, path), 404)["detail"]
@@ -173,7 +173,7 @@ async def test_a_path_that_is_not_there_is_not_redirected_and_helps(
 # --- pages and headers ---
 
 
-async def test_no_page_needs_another_host(mesh: Mesh) -> None:
+async def test_pages_load_nothing_from_another_host(mesh: Mesh) -> None:
     for path in ("/", "/docs", "/docs/start.js", "/favicon.ico"):
         text = (await mesh.ask("GET", path)).text.replace("http://www.w3.org/2000/svg", "")
         assert not re.findall(r"""(?:https?:)?//[a-z0-9.-]+\.[a-z]{2,}""", text), path

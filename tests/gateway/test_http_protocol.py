@@ -1,4 +1,4 @@
-"""A request that offers HTTP/2, as Java and ``curl --http2`` send it, is read whole; WebSockets still open."""
+"""Requests that offer HTTP/2, as Java and ``curl --http2`` send them: their bodies are read, and WebSockets open."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from websockets.sync.client import connect
 
 OFFER = b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AAEAAEAAAAIAAAAA\r\n"
 LAST = b"GET /last HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
-"""What makes the server close the connection, so that a test knows that nothing more comes."""
+"""A request after which the server closes the connection, so that a test knows that nothing follows."""
 
 
 @pytest.fixture(scope="module")
 def port() -> Iterator[int]:
-    """A server that says back what it read."""
+    """Yield the port of a server that returns what it read."""
     app = FastAPI()
 
     @app.api_route("/{path}", methods=["GET", "POST"])
@@ -35,14 +35,14 @@ def port() -> Iterator[int]:
         yield found
 
 
-def said(raw: bytes) -> list[tuple[str, str]]:
-    """(path, body) of each answer."""
+def answers_in(raw: bytes) -> list[tuple[str, str]]:
+    """Return path and body of each answer."""
     lines = [line for line in raw.decode().replace("}HTTP", "}\r\nHTTP").splitlines() if line.startswith("{")]
     return [(answer["path"], answer["body"]) for answer in map(json.loads, lines)]
 
 
 def post(path: bytes, body: bytes, more: bytes = OFFER) -> bytes:
-    """A request with a length."""
+    """Return a request with a length."""
     head = b"POST /" + path + b" HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + str(len(body)).encode()
     return head + b"\r\n" + more + b"\r\n" + body
 
@@ -53,31 +53,32 @@ CHUNKED = (
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 1000, 100_000])
-def test_an_offer_of_http2_is_ignored_and_the_body_is_read(port: int, size: int) -> None:
+def test_offer_of_http2_is_ignored_and_the_body_is_read(port: int, size: int) -> None:
     large = b"x" * 5000 if size > 7 else b"xy"
     whole = post(b"a", b'{"task": "grasp"}') + CHUNKED + post(b"b", large) + post(b"e", b"") + LAST
     pieces = [whole[i : i + size] for i in range(0, len(whole), size)]
-    assert said(answers(port, pieces)) == [
+    assert answers_in(answers(port, pieces)) == [
         ("a", '{"task": "grasp"}'), ("c", "abcde"), ("b", large.decode()), ("e", ""), ("last", ""),
     ]  # fmt: skip
 
 
-def test_the_body_may_come_long_after_the_headers(port: int) -> None:
+def test_body_may_come_long_after_the_headers(port: int) -> None:
     request = post(b"a", b"late")
-    assert said(answers(port, [request[:-4], request[-4:-2], request[-2:], LAST])) == [("a", "late"), ("last", "")]
+    raw = answers(port, [request[:-4], request[-4:-2], request[-2:], LAST])
+    assert answers_in(raw) == [("a", "late"), ("last", "")]
 
 
-def test_a_server_that_ignores_the_offer_still_answers_expect(port: int) -> None:
+def test_server_that_ignores_the_offer_still_answers_expect(port: int) -> None:
     request = post(b"a", b"asked", OFFER + b"Expect: 100-continue\r\n")
     raw = answers(port, [request[:-5], request[-5:], LAST])
     assert raw.startswith(b"HTTP/1.1 100 Continue\r\n")
-    assert said(raw) == [("a", "asked"), ("last", "")]
+    assert answers_in(raw) == [("a", "asked"), ("last", "")]
 
 
-def test_other_offers_and_headers_beside_them_are_taken_the_same_way(port: int) -> None:
+def test_other_offers_and_further_headers_are_ignored_as_well(port: int) -> None:
     offer = b"Upgrade: TLS/1.0\r\nConnection: keep-alive, upgrade\r\nX-Mine: 1\r\n"
     raw = answers(port, [post(b"a", b"q", offer), LAST])
-    assert said(raw) == [("a", "q"), ("last", "")]
+    assert answers_in(raw) == [("a", "q"), ("last", "")]
     assert b"x-mine" in raw
     assert b'"upgrade"' not in raw
 
@@ -87,7 +88,7 @@ def test_nonsense_after_an_offer_is_a_bad_request(port: int) -> None:
     assert raw.startswith(b"HTTP/1.1 400")
 
 
-def test_a_websocket_still_opens(port: int) -> None:
+def test_websocket_still_opens(port: int) -> None:
     with connect(f"ws://127.0.0.1:{port}/socket") as socket:
         socket.send("hello")
         assert socket.recv() == "hello"

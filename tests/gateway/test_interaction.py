@@ -1,4 +1,4 @@
-"""Gaze, decisions, performance, overrides and reads through the REST door, field by field."""
+"""Gaze, decisions, performance, overrides and reads over REST, field by field."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import TRIPLES, Triple
-from support.gateway_mesh import NEGATED, PLAIN, STUDY, Mesh, Session, events_of, gaze_socket, performance
+from support.gateway_mesh import NEGATED, PLAIN, STUDY, Mesh, Session, gaze_socket, performance
 
 pytestmark = pytest.mark.anyio
 ACTIONS = [
@@ -23,7 +23,7 @@ ACTIONS = [
 # --- decisions ---
 
 
-async def test_the_first_decision_field_by_field(mesh: Mesh) -> None:
+async def test_first_decision_has_every_field(mesh: Mesh) -> None:
     session = await mesh.session()
     await session.look(["left"] * 4)
     answer = await session.post("decisions", {"task": "grasp", "decision_id": "d1"})
@@ -52,7 +52,7 @@ async def test_two_sessions_of_one_seed_decide_alike_and_another_seed_does_not(m
     assert alike[0] == alike[1] != other
 
 
-async def test_a_repeat_gets_the_first_result_and_another_content_is_a_conflict(mesh: Mesh) -> None:
+async def test_repeat_gets_the_first_result_and_another_content_is_a_conflict(mesh: Mesh) -> None:
     session = await mesh.session()
     first = await session.post("decisions", {"task": "grasp", "decision_id": "d1"})
     again = await session.post("decisions", {"task": "grasp", "decision_id": "d1"})
@@ -62,7 +62,7 @@ async def test_a_repeat_gets_the_first_result_and_another_content_is_a_conflict(
     assert (await session.decide())["n"] == 2, "the repeats count for nothing"
 
 
-async def test_repeats_at_the_same_moment_are_one_decision(mesh: Mesh) -> None:
+async def test_simultaneous_repeats_are_one_decision(mesh: Mesh) -> None:
     session = await mesh.session()
     answers = await asyncio.gather(
         *(session.post("decisions", {"task": "grasp", "decision_id": "d1"}) for _ in range(8))
@@ -71,7 +71,7 @@ async def test_repeats_at_the_same_moment_are_one_decision(mesh: Mesh) -> None:
     assert (await session.read())["counts"]["decision"] == 1
 
 
-async def test_many_at_once_are_numbered_without_a_gap(mesh: Mesh) -> None:
+async def test_simultaneous_decisions_are_numbered_without_a_gap(mesh: Mesh) -> None:
     session = await mesh.session()
     answers = await asyncio.gather(*(session.decide(decision_id=f"d{i}") for i in range(12)))
     assert sorted(a["n"] for a in answers) == list(range(1, 13))
@@ -79,7 +79,7 @@ async def test_many_at_once_are_numbered_without_a_gap(mesh: Mesh) -> None:
     assert {a["policy_source"] for a in answers} == {"learner"}
 
 
-async def test_a_task_that_the_study_does_not_have_is_unknown(mesh: Mesh) -> None:
+async def test_task_that_the_study_does_not_have_is_unknown(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     for answer in (
         await session.post("decisions", {"task": "pour"}),
@@ -93,7 +93,7 @@ async def test_a_task_that_the_study_does_not_have_is_unknown(mesh: Mesh) -> Non
 # --- the preview ---
 
 
-async def test_the_preview_is_the_decision_that_follows_and_has_no_side_effect(mesh: Mesh) -> None:
+async def test_preview_is_the_decision_that_follows_and_has_no_side_effect(mesh: Mesh) -> None:
     session = await mesh.session()
     for n in range(1, 6):
         previews = [await session.read("strategy?task=grasp")]
@@ -110,7 +110,7 @@ async def test_the_preview_is_the_decision_that_follows_and_has_no_side_effect(m
         await session.report(f"d{n}", understood=n % 2 == 0)
 
 
-async def test_the_preview_shows_an_override_that_waits(mesh: Mesh) -> None:
+async def test_preview_shows_an_override_that_waits(mesh: Mesh) -> None:
     session = await mesh.session()
     await session.done("override", {"task": "grasp", "strategy": NEGATED})
     shown = await session.read("strategy?task=grasp")
@@ -121,7 +121,7 @@ async def test_the_preview_shows_an_override_that_waits(mesh: Mesh) -> None:
 # --- performance ---
 
 
-async def test_a_report_answers_with_the_reward(mesh: Mesh) -> None:
+async def test_report_answers_with_the_reward(mesh: Mesh) -> None:
     session = await mesh.session()
     await session.decide(decision_id="d1")
     answer = await session.post("performance", performance("d1", understood=True, able=False, seconds=3.0))
@@ -135,7 +135,7 @@ async def test_a_report_answers_with_the_reward(mesh: Mesh) -> None:
     assert (await session.read("policy"))["cumulative_reward"] == 1.0
 
 
-async def test_a_report_is_taken_once(mesh: Mesh) -> None:
+async def test_report_counts_once(mesh: Mesh) -> None:
     session = await mesh.session()
     await session.decide(decision_id="d1")
     first = await session.post("performance", performance("d1"))
@@ -147,7 +147,7 @@ async def test_a_report_is_taken_once(mesh: Mesh) -> None:
     assert counts["performance"] == counts["transition"] == 1
 
 
-async def test_a_report_of_an_unknown_decision_is_unknown(mesh: Mesh) -> None:
+async def test_report_of_an_unknown_decision_is_unknown(mesh: Mesh) -> None:
     session = await mesh.session()
     answer = await session.post("performance", performance("nobody"))
     assert answer.status_code == 404
@@ -157,7 +157,7 @@ async def test_a_report_of_an_unknown_decision_is_unknown(mesh: Mesh) -> None:
 # --- override and markers ---
 
 
-async def test_an_override_holds_for_the_task_s_next_decision(mesh: Mesh) -> None:
+async def test_override_holds_for_the_task_s_next_decision(mesh: Mesh) -> None:
     session = await mesh.session()
     body = {"task": "grasp", "strategy": NEGATED, "reason": "the other hand", "override_id": "o1"}
     answer = await session.post("override", body)
@@ -175,14 +175,14 @@ async def test_an_override_holds_for_the_task_s_next_decision(mesh: Mesh) -> Non
 @pytest.mark.parametrize(
     "strategy", [{}, {"negation": "negation"}, NEGATED | {"pace": "slow"}, NEGATED | {"negation": "no"}], ids=str
 )
-async def test_an_override_that_is_no_strategy_is_refused_by_field(mesh: Mesh, strategy: dict[str, str]) -> None:
+async def test_override_that_is_not_a_strategy_is_refused_by_field(mesh: Mesh, strategy: dict[str, str]) -> None:
     session = await mesh.session()
     answer = await session.post("override", {"task": "grasp", "strategy": strategy})
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["field"].startswith("strategy.")
 
 
-async def test_markers_are_kept_once(mesh: Mesh) -> None:
+async def test_repeated_marker_is_recorded_once(mesh: Mesh) -> None:
     session = await mesh.session()
     body = {"text": "the participant laughs ☺\n", "marker_id": "m1"}
     first, again = await session.post("markers", body), await session.post("markers", body)
@@ -196,7 +196,7 @@ async def test_markers_are_kept_once(mesh: Mesh) -> None:
 # --- gaze and the observation ---
 
 
-async def test_the_observation_field_by_field(mesh: Mesh) -> None:
+async def test_observation_has_every_field(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     fresh = await session.read("observation")
     assert fresh["session"] == session.name
@@ -238,7 +238,7 @@ async def test_points_become_fixations_on_aois(mesh: Mesh) -> None:
     assert (await session.read())["counts"]["fixation"] == 2, "what is open when the session ends, ends there"
 
 
-async def test_chunks_are_numbered(mesh: Mesh) -> None:
+async def test_chunk_numbers_are_checked(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
 
     async def send(seq: int, t: float) -> Any:
@@ -254,8 +254,8 @@ async def test_chunks_are_numbered(mesh: Mesh) -> None:
     assert (await session.read())["counts"]["gaze"] == 3
 
 
-async def test_a_tracker_that_is_started_again_loses_nothing_that_was_answered(mesh: Mesh) -> None:
-    """Over REST and over the WebSocket: 200 chunks, again from number 0 with other content, and each of them twice."""
+async def test_restarted_tracker_loses_no_acknowledged_chunk(mesh: Mesh) -> None:
+    """Send 200 chunks over REST and WebSocket, then again from number 0 with other content, and each of them twice."""
     session = await mesh.session(STUDY)
 
     def chunk(seq: int, start_s: float, x: float) -> dict[str, Any]:
@@ -277,7 +277,7 @@ async def test_a_tracker_that_is_started_again_loses_nothing_that_was_answered(m
     assert (await session.read())["counts"]["gaze"] == 120, "a repeat is one, however long ago"
 
 
-async def test_the_same_gaze_sent_twice_at_once_is_recorded_once(mesh: Mesh) -> None:
+async def test_same_gaze_sent_twice_at_once_is_recorded_once(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     body = {"source": "a", "seq": 0, "t": [0.0, 0.1], "aoi": ["cup", "cup"]}
     answers = await asyncio.gather(*(session.done("gaze", body) for _ in range(8)))
@@ -285,7 +285,7 @@ async def test_the_same_gaze_sent_twice_at_once_is_recorded_once(mesh: Mesh) -> 
     assert (await session.read())["counts"]["gaze"] == 1
 
 
-async def test_what_is_accepted_and_can_have_no_effect_is_said(mesh: Mesh) -> None:
+async def test_accepted_gaze_without_an_effect_gets_a_warning(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     t = [i / 2 for i in range(10)]
     answer = await session.done("gaze", {"source": "a", "seq": 0, "t": t, "x": [0.1] * 10, "y": [0.5] * 10})
@@ -294,7 +294,7 @@ async def test_what_is_accepted_and_can_have_no_effect_is_said(mesh: Mesh) -> No
     assert (await session.read("observation"))["warnings"] == answer["warnings"]
 
 
-async def test_an_aoi_that_the_study_does_not_name_is_refused_with_those_that_it_has(mesh: Mesh) -> None:
+async def test_aoi_that_the_study_does_not_name_is_refused_with_those_that_it_has(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     answer = await session.post("gaze", {"source": "a", "seq": 0, "t": [0.0, 1.0], "aoi": ["robot", "moon"]})
     assert answer.status_code == 422
@@ -303,7 +303,7 @@ async def test_an_aoi_that_the_study_does_not_name_is_refused_with_those_that_it
     assert "robot, cup" in error["rule"]
 
 
-async def test_a_source_that_was_replaced_is_refused(mesh: Mesh) -> None:
+async def test_source_that_was_replaced_is_refused(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     await session.look(["cup"], source="first")
     await session.look(["cup"], source="second")
@@ -312,7 +312,7 @@ async def test_a_source_that_was_replaced_is_refused(mesh: Mesh) -> None:
     assert "first was replaced by second" in answer.json()["detail"]
 
 
-async def test_time_rises_over_chunks_as_well(mesh: Mesh) -> None:
+async def test_time_must_rise_over_chunks(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     await session.look(["cup", "cup"])
     answer = await session.post("gaze", {"source": "ros", "seq": 1, "t": [0.5], "aoi": ["cup"]})
@@ -320,7 +320,7 @@ async def test_time_rises_over_chunks_as_well(mesh: Mesh) -> None:
     assert answer.json()["errors"][0]["field"] == "t"
 
 
-async def test_a_websocket_takes_a_chunk_a_message(mesh: Mesh) -> None:
+async def test_websocket_accepts_one_chunk_in_each_message(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     async with gaze_socket(mesh, session.name) as socket:
         chunk = {"source": "ws", "seq": 0, "t": [0.0, 0.5], "aoi": ["cup", None]}
@@ -340,7 +340,7 @@ async def test_a_websocket_takes_a_chunk_a_message(mesh: Mesh) -> None:
 
 
 @pytest.mark.parametrize(("name", "status"), [("nobody", 404), ("**", 422)])
-async def test_a_websocket_answers_with_problems_of_ids_and_sessions(mesh: Mesh, name: str, status: int) -> None:
+async def test_websocket_answers_with_problems_of_ids_and_sessions(mesh: Mesh, name: str, status: int) -> None:
     async with gaze_socket(mesh, name) as socket:
         assert (await socket.send("{"))["status"] == status
 
@@ -348,7 +348,7 @@ async def test_a_websocket_answers_with_problems_of_ids_and_sessions(mesh: Mesh,
 # --- corrections ---
 
 
-async def test_a_wrong_report_is_corrected_and_both_are_kept(mesh: Mesh) -> None:
+async def test_wrong_report_is_corrected_and_both_are_kept(mesh: Mesh) -> None:
     session = await mesh.session()
     decision_id = (await session.decide())["decision_id"]
     result = {"success": False, "duration_s": 5000.0}
@@ -370,7 +370,7 @@ async def test_a_wrong_report_is_corrected_and_both_are_kept(mesh: Mesh) -> None
     assert (await session.post("performance", {**body, "decision_id": "nothing"})).status_code == 404
 
 
-async def test_a_correction_of_what_was_never_reported_is_refused(mesh: Mesh) -> None:
+async def test_correction_without_a_report_is_refused(mesh: Mesh) -> None:
     session = await mesh.session()
     decision_id = (await session.decide())["decision_id"]
     right = {name: {"success": True, "duration_s": 5.0} for name in ("comprehension", "enabledness")}
@@ -382,7 +382,7 @@ async def test_a_correction_of_what_was_never_reported_is_refused(mesh: Mesh) ->
 # --- the policy ---
 
 
-async def test_the_policy_field_by_field(mesh: Mesh) -> None:
+async def test_policy_has_every_field(mesh: Mesh) -> None:
     session = await mesh.session()
     policy = await session.read("policy")
     assert (policy["version"], policy["learner"], policy["for_n"]) == (1, "q-learning", 1)
@@ -401,12 +401,12 @@ async def test_the_policy_field_by_field(mesh: Mesh) -> None:
     assert row["visits"][decision["actions"].index(decision["strategy"])] == 1
 
 
-async def test_a_learner_without_exploration_has_no_epsilon(mesh: Mesh) -> None:
+async def test_learner_without_exploration_has_no_epsilon(mesh: Mesh) -> None:
     session = await mesh.session(STUDY, condition="control")
     assert (await session.read("policy"))["epsilon"] is None
 
 
-async def test_a_learner_on_triples_names_its_states_so(mesh: Mesh) -> None:
+async def test_learner_on_triples_names_its_states_by_triples(mesh: Mesh) -> None:
     session = await mesh.session({"study": "x", "learner": {"name": "ucb1"}})
     policy = await session.read("policy")
     assert list(policy["states"]) == [t.name for t in TRIPLES]
@@ -417,7 +417,7 @@ async def test_a_learner_on_triples_names_its_states_so(mesh: Mesh) -> None:
 # --- what a door answered is in everything that it answers afterwards ---
 
 
-async def test_every_write_is_in_the_next_read_and_decision(mesh: Mesh) -> None:
+async def test_next_read_and_decision_include_every_write(mesh: Mesh) -> None:
     session = await mesh.session({"study": "x"})
     for n in range(1, 9):
         await session.look(["left", "right"])
@@ -435,7 +435,7 @@ async def test_every_write_is_in_the_next_read_and_decision(mesh: Mesh) -> None:
         assert (shown["versions"]["config"], shown["n"], shown["stale"]) == (n + 1, n + 1, False)
 
 
-async def test_two_sessions_at_once_do_not_mix(mesh: Mesh) -> None:
+async def test_simultaneous_sessions_are_independent(mesh: Mesh) -> None:
     one, two = await mesh.session(seed=1), await mesh.session(seed=2)
 
     async def live(session: Session, rounds: int) -> None:
@@ -453,26 +453,6 @@ async def test_two_sessions_at_once_do_not_mix(mesh: Mesh) -> None:
     assert [e["counts"]["performance"] for e in ends] == [8, 5]
 
 
-async def test_events_are_the_facts_of_the_session_as_they_happen(mesh: Mesh) -> None:
-    session, other = await mesh.session(), await mesh.session()
-    async with events_of(session) as events:
-        await other.decide()
-        decision = await session.decide(decision_id="d1")
-        await session.report("d1")
-        seen: dict[str, Any] = {}
-        async for name, data in events:
-            assert data["session"] == session.name
-            seen.setdefault(name, data)
-            if {"decision", "performance", "transition", "policy", "observation"} <= seen.keys():
-                break
-    assert seen["decision"]["decision_id"] == "d1"
-    assert seen["decision"]["strategy"] == decision["strategy"]
-
-
-async def test_events_of_nobody_are_unknown(mesh: Mesh) -> None:
-    assert (await mesh.ask("GET", "/v1/sessions/nobody/events")).status_code == 404
-
-
 # --- all 30 triples ---
 
 EO, EM, DM, OS, UF = (
@@ -484,15 +464,15 @@ MODEL = {
     ("high", "distracted"): (UF, UF, DM, UF, DM),
     ("high", "focused"): (EO, EO, EM, EO, EM),
 }
-"""MODEL.md, section 2; uncertain is as distracted."""
+"""MODEL.md, section 2; uncertain counts as distracted."""
 RESULTS = {
     "failure": (False, False), "misconception_enabledness": (True, False), "misconception_comprehension": (False, True),
     "success": (True, True),
 }  # fmt: skip
 
 
-async def brought_about(session: Session, triple: Triple) -> None:
-    """Capacity by strategies, gaze by where one looks, awareness by results: all of it through the doors."""
+async def reach_state(session: Session, triple: Triple) -> None:
+    """Bring a session into a monitoring state by strategies, looks and results."""
     if triple.gaze == "focused":
         await session.look(["left"] * 6)
     elif triple.gaze == "distracted":
@@ -506,9 +486,9 @@ async def brought_about(session: Session, triple: Triple) -> None:
 
 
 @pytest.mark.parametrize("triple", TRIPLES, ids=lambda t: t.name)
-async def test_each_triple_gives_the_model_s_state(mesh: Mesh, triple: Triple) -> None:
+async def test_each_triple_gives_the_model_s_cognitive_state(mesh: Mesh, triple: Triple) -> None:
     session = await mesh.session()
-    await brought_about(session, triple)
+    await reach_state(session, triple)
     gaze = "distracted" if triple.gaze == "uncertain" else triple.gaze
     expected = MODEL[triple.capacity, gaze][["unknown", *RESULTS].index(triple.awareness)]
     for shown in (await session.read("strategy?task=grasp"), await session.decide()):

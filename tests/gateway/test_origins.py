@@ -1,4 +1,4 @@
-"""Which hosts and origins the gateway answers, and what it says to the others."""
+"""The hosts and origins that the gateway answers, and its refusals of others."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HERE = "127.0.0.1:8080"
 
 
 def asked(method: str = "POST", host: str = HERE, *origins: str, **given: Any) -> RequestOrigin:
-    """A request."""
+    """Return the origin of a request."""
     return RequestOrigin(method, (host,), origins, **given)
 
 
@@ -35,19 +35,19 @@ def test_loopback_named_hosts_and_the_address_that_was_reached_are_answered(host
      "192.168.1.6", "10.0.0.1:8080", "[fe80::1]", "", ":8080", "127.0.0.1:99999", "127.0.0.1:x", "a@127.0.0.1",
      "127.0.0.1/x", "127.0.0.1, evil.example", "[::1", "::1", "*"],
 )  # fmt: skip
-def test_a_foreign_or_broken_host_is_refused_by_name(host: str) -> None:
+def test_foreign_or_broken_host_is_refused_by_name(host: str) -> None:
     with pytest.raises(WrongHost) as refused:
         RULES.check(asked("GET", host, server="192.168.1.5"))
     assert repr(host) in refused.value.detail
     assert "localhost, 127.0.0.1, [::1], gateway, lab-pc.example.org" in refused.value.detail
 
 
-def test_the_refusal_of_a_host_says_what_to_set() -> None:
+def test_refusal_of_a_host_names_the_setting() -> None:
     with pytest.raises(WrongHost, match="start it with SHIFT_HOSTS=lab-pc"):
         RULES.check(asked("GET", "LAB-PC:8080"))
 
 
-def test_two_hosts_are_refused_and_none_is_answered() -> None:
+def test_two_hosts_are_refused_and_a_missing_host_is_accepted() -> None:
     with pytest.raises(WrongHost, match="names 2 hosts"):
         RULES.check(RequestOrigin("GET", (HERE, HERE)))
     assert RULES.check(RequestOrigin("GET")) is None, "HTTP/1.0 has none, and a browser always sends one"
@@ -59,12 +59,12 @@ def test_two_hosts_are_refused_and_none_is_answered() -> None:
      ("gateway", "http://gateway"), ("gateway:80", "http://gateway"), ("gateway", "https://gateway"),
      ("[::1]:8080", "http://[::1]:8080")],
 )  # fmt: skip
-def test_the_gateway_s_own_page_needs_no_setting(host: str, origin: str) -> None:
+def test_gateway_s_own_page_needs_no_setting(host: str, origin: str) -> None:
     assert RULES.check(asked("POST", host, origin)) is None
 
 
 @pytest.mark.parametrize("origin", ["https://lab.example.org", "http://localhost:3000"])
-def test_a_named_origin_is_said_back(origin: str) -> None:
+def test_named_origin_is_returned(origin: str) -> None:
     assert RULES.check(asked("POST", HERE, origin, fetch_site="cross-site")) == origin
 
 
@@ -75,7 +75,7 @@ def test_a_named_origin_is_said_back(origin: str) -> None:
      "chrome-extension://abc", "127.0.0.1:8080", "ftp://127.0.0.1:8080"],
 )  # fmt: skip
 @pytest.mark.parametrize("method", ["GET", "POST", "OPTIONS", "PATCH"])
-def test_a_foreign_origin_is_refused_by_name(method: str, origin: str) -> None:
+def test_foreign_origin_is_refused_by_name(method: str, origin: str) -> None:
     with pytest.raises(ForeignOrigin, match="SHIFT_ORIGINS") as refused:
         RULES.check(asked(method, HERE, origin))
     assert origin in refused.value.detail
@@ -87,7 +87,7 @@ def test_several_origins_are_refused() -> None:
 
 
 @pytest.mark.parametrize("site", ["cross-site", "same-site"])
-def test_without_an_origin_the_browser_s_word_counts(site: str) -> None:
+def test_without_an_origin_the_browser_s_fetch_site_decides(site: str) -> None:
     with pytest.raises(ForeignOrigin):
         RULES.check(asked("POST", HERE, fetch_site=site, fetch_mode="navigate"))
     with pytest.raises(ForeignOrigin):
@@ -116,7 +116,7 @@ def test_hosts_and_origins_are_read_from_comma_separated_variables(monkeypatch: 
      ("ORIGINS", "https://lab.example.org/page", "scheme"), ("HOSTS", "http://gateway", "not a host name"),
      ("HOSTS", "*", "not a host name")],
 )  # fmt: skip
-def test_what_is_not_an_origin_or_host_stops_the_start(
+def test_invalid_origin_or_host_prevents_the_start(
     monkeypatch: pytest.MonkeyPatch, name: str, value: str, says: str
 ) -> None:
     monkeypatch.setenv(f"SHIFT_{name}", value)

@@ -1,4 +1,4 @@
-"""What goes wrong: problem documents, their order, hostile input, and services that are not there."""
+"""Refusals: problem documents, their order, hostile input, and missing services."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from support.gateway_mesh import NEGATED, STUDY, Mesh, performance, problem, unt
 
 pytestmark = pytest.mark.anyio
 LEFT_OUT = (("decisions", "decision_id"), ("override", "override_id"), ("markers", "marker_id"))
-"""Ids that a command can do without."""
+"""Ids that a command may leave out."""
 HOSTILE = ("**", "*", "a%2Fb", "..%2Fx", "%2e%2e", "a%00", "a%0A", "-a", "a.b", "ä", "%20", "a" * 64, "a" * 60_000)
 COMMANDS: dict[str, Any] = {
     "gaze": {"source": "a", "seq": 0, "t": [0.0], "aoi": ["left"]},
@@ -32,7 +32,7 @@ WAIT = {"study": "x", "decider": {"wait_s": 0.2}}
 
 
 @pytest.mark.parametrize("tail", COMMANDS)
-async def test_ids_are_looked_at_before_the_session_and_the_session_before_the_body(mesh: Mesh, tail: str) -> None:
+async def test_ids_are_checked_before_the_session_and_the_session_before_the_body(mesh: Mesh, tail: str) -> None:
     session = await mesh.session()
     for body in (b"{", b"x" * 300_000, json.dumps(COMMANDS[tail]).encode()):
         problem(await mesh.ask("POST", f"/v1/sessions/**/{tail}", content=body), 422)
@@ -41,13 +41,13 @@ async def test_ids_are_looked_at_before_the_session_and_the_session_before_the_b
     problem(await mesh.ask("POST", session.path(tail), content=b"x" * 300_000), 413)
 
 
-async def test_a_patch_has_the_same_order(mesh: Mesh) -> None:
+async def test_patch_is_checked_in_the_same_order(mesh: Mesh) -> None:
     problem(await mesh.ask("PATCH", "/v1/sessions/**/config", content=b"{"), 422)
     problem(await mesh.ask("PATCH", "/v1/sessions/nobody/config", content=b"{"), 404)
 
 
 @pytest.mark.parametrize("name", HOSTILE, ids=lambda n: n[:20])
-async def test_hostile_sessions_are_refused_at_the_door(mesh: Mesh, name: str) -> None:
+async def test_hostile_sessions_are_refused(mesh: Mesh, name: str) -> None:
     for tail in READS:
         assert problem(await mesh.ask("GET", f"/v1/sessions/{name}/{tail}".rstrip("/")), 404 if "%2F" in name else 422)
     for tail, body in COMMANDS.items():
@@ -78,7 +78,7 @@ async def test_hostile_tasks_of_the_preview_are_refused(mesh: Mesh) -> None:
     problem(await mesh.ask("GET", "/v1/sessions/nobody/strategy?task=**"), 422)
 
 
-async def test_unknown_sessions_are_unknown_everywhere(mesh: Mesh) -> None:
+async def test_every_path_answers_404_for_an_unknown_session(mesh: Mesh) -> None:
     for tail in READS:
         assert (
             "no session nobody"
@@ -87,7 +87,7 @@ async def test_unknown_sessions_are_unknown_everywhere(mesh: Mesh) -> None:
     problem(await mesh.ask("POST", "/v1/sessions/nobody/end"), 404)
 
 
-async def test_paths_and_methods_that_there_are_not_are_problems_as_well(mesh: Mesh) -> None:
+async def test_unknown_paths_and_methods_are_problems(mesh: Mesh) -> None:
     problem(await mesh.ask("GET", "/v1/nothing"), 404)
     problem(await mesh.ask("DELETE", "/v1/sessions"), 405)
     problem(await mesh.ask("GET", "/v1/" + "x" * 60_000), 404)
@@ -97,14 +97,14 @@ async def test_paths_and_methods_that_there_are_not_are_problems_as_well(mesh: M
 
 
 async def pieces(total: int, size: int = 10_000, head: bytes = b"") -> AsyncIterator[bytes]:
-    """A body of ``total`` bytes in pieces, without a length."""
+    """Yield a body of ``total`` bytes in pieces, without a length."""
     yield head
     for _ in range(total // size):
         yield b" " * size
 
 
 @pytest.mark.parametrize("tail", COMMANDS)
-async def test_a_body_above_256_kb_is_refused_and_nothing_of_it_is_done(mesh: Mesh, tail: str) -> None:
+async def test_body_above_256_kb_is_refused_and_has_no_effect(mesh: Mesh, tail: str) -> None:
     session = await mesh.session()
     if tail == "performance":
         await session.decide(decision_id="d1")
@@ -116,7 +116,7 @@ async def test_a_body_above_256_kb_is_refused_and_nothing_of_it_is_done(mesh: Me
     assert (await mesh.ask("POST", session.path(tail), content=pieces(200_000, head=whole))).status_code in (201, 202)
 
 
-async def test_starts_patches_and_ends_have_the_limit_too(mesh: Mesh) -> None:
+async def test_starts_patches_and_ends_have_the_same_limit(mesh: Mesh) -> None:
     session = await mesh.session()
     whole = b'{"participant":"P01","session":"toolarge"}'
     problem(await mesh.ask("POST", "/v1/sessions", content=pieces(300_000, head=whole)), 413)
@@ -144,7 +144,7 @@ async def test_bad_bodies_are_problems_everywhere(mesh: Mesh, body: bytes) -> No
 
 
 @pytest.mark.parametrize("number", ["1e999", "-1e999", "NaN", "Infinity", "true", '"1"', "null", "[]", "{}"])
-async def test_what_is_no_number_is_refused_where_one_belongs(mesh: Mesh, number: str) -> None:
+async def test_value_that_is_not_a_number_is_refused(mesh: Mesh, number: str) -> None:
     session = await mesh.session(STUDY)
     await session.decide(decision_id="d1")
     duration = json.dumps(performance("d1")).replace("5.0", number)
@@ -184,7 +184,7 @@ QUIET = settings(deadline=None, max_examples=60, derandomize=True, suppress_heal
     st.dictionaries(st.sampled_from(FIELDS), values, max_size=4),
     st.booleans(),
 )
-async def test_no_body_makes_a_server_error(mesh: Mesh, door: str, change: dict[str, Any], bare: bool) -> None:
+async def test_no_json_body_causes_a_server_error(mesh: Mesh, door: str, change: dict[str, Any], bare: bool) -> None:
     session = getattr(mesh, "fuzzed", None) or await mesh.session(STUDY)
     mesh.fuzzed = session  # type: ignore[attr-defined]
     base = {} if bare else COMMANDS.get(door, {"participant": "P01"} if door == "start" else {})
@@ -202,7 +202,7 @@ async def test_no_body_makes_a_server_error(mesh: Mesh, door: str, change: dict[
 
 @QUIET
 @given(st.binary(max_size=200), st.sampled_from([*COMMANDS, "config"]))
-async def test_no_bytes_make_a_server_error(mesh: Mesh, body: bytes, door: str) -> None:
+async def test_no_bytes_cause_a_server_error(mesh: Mesh, body: bytes, door: str) -> None:
     session = getattr(mesh, "fuzzed", None) or await mesh.session(STUDY)
     mesh.fuzzed = session  # type: ignore[attr-defined]
     method = "PATCH" if door == "config" else "POST"
@@ -212,7 +212,7 @@ async def test_no_bytes_make_a_server_error(mesh: Mesh, body: bytes, door: str) 
 # --- services that are not there ---
 
 
-async def test_a_service_that_is_stopped_is_named(own_mesh: Mesh) -> None:
+async def test_stopped_service_is_named(own_mesh: Mesh) -> None:
     session = await own_mesh.session(WAIT)
     await session.decide(decision_id="d1")
     for name, asks in (
@@ -238,7 +238,7 @@ async def test_a_service_that_is_stopped_is_named(own_mesh: Mesh) -> None:
     assert (await session.end())["counts"]["decision"] == 2
 
 
-async def test_while_the_recorder_is_away_nobody_says_that_a_session_is_unknown(own_mesh: Mesh) -> None:
+async def test_no_session_is_called_unknown_without_the_recorder(own_mesh: Mesh) -> None:
     session = await own_mesh.session(WAIT)
     await own_mesh.stop("recorder")
     for tail in READS:
@@ -253,7 +253,7 @@ async def test_while_the_recorder_is_away_nobody_says_that_a_session_is_unknown(
     assert [s["session"] for s in (await own_mesh.ask("GET", "/v1/sessions")).json()["sessions"]] == [session.name]
 
 
-async def test_without_the_monitor_decisions_go_on_and_say_that_they_are_stale(own_mesh: Mesh) -> None:
+async def test_decisions_without_the_monitor_are_stale(own_mesh: Mesh) -> None:
     session = await own_mesh.session(WAIT)
     await session.decide()
     await session.read("observation")
@@ -266,7 +266,7 @@ async def test_without_the_monitor_decisions_go_on_and_say_that_they_are_stale(o
     assert (shown["stale"], shown["n"]) == (True, 4)
 
 
-async def test_without_the_learner_decisions_go_on_with_the_last_policy(own_mesh: Mesh) -> None:
+async def test_decisions_without_the_learner_use_the_last_policy(own_mesh: Mesh) -> None:
     session = await own_mesh.session(WAIT)
     await session.decide()
     await session.read("policy")
@@ -281,14 +281,14 @@ async def test_without_the_learner_decisions_go_on_with_the_last_policy(own_mesh
     assert (await session.decide())["policy_source"] == "learner"
 
 
-async def test_where_there_never_was_a_policy_the_scoring_system_decides(own_mesh: Mesh) -> None:
+async def test_scoring_system_decides_before_the_first_policy(own_mesh: Mesh) -> None:
     await own_mesh.stop("learner")
     session = await own_mesh.session(WAIT)
     decision = await session.decide()
     assert (decision["policy_source"], decision["strategy"]) == ("scoring", decision["suggested"])
 
 
-async def test_a_new_gateway_knows_what_the_journals_hold(own_mesh: Mesh) -> None:
+async def test_new_gateway_reads_the_journals(own_mesh: Mesh) -> None:
     live, over = await own_mesh.session(WAIT), await own_mesh.session(WAIT)
     for session in (live, over):
         await session.decide(decision_id="d1")
@@ -306,9 +306,7 @@ async def test_a_new_gateway_knows_what_the_journals_hold(own_mesh: Mesh) -> Non
         assert (await live.decide())["n"] == 2
 
 
-async def test_an_end_waits_for_a_service_that_is_away_and_can_be_asked_again(
-    own_mesh: Mesh, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_end_without_a_service_fails_and_can_be_repeated(own_mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shift_recorder.service.convergence.END_WAIT_S", 0.1)
     session = await own_mesh.session(WAIT)
     await own_mesh.stop("learner")
@@ -323,7 +321,7 @@ async def test_an_end_waits_for_a_service_that_is_away_and_can_be_asked_again(
 # --- operations ---
 
 
-async def test_the_process_is_up_and_every_service_is_ready(mesh: Mesh) -> None:
+async def test_process_is_up_and_every_service_is_ready(mesh: Mesh) -> None:
     assert (await mesh.ask("GET", "/healthz")).status_code == 200
     ready = (await mesh.ask("GET", "/readyz")).json()
     assert (ready["ready"], ready["missing"]) == (True, [])
@@ -331,7 +329,7 @@ async def test_the_process_is_up_and_every_service_is_ready(mesh: Mesh) -> None:
     assert set(ready["services"]) == {"recorder", "monitor", "decider", "learner", "gateway"}
 
 
-async def test_metrics_are_those_of_all_services(mesh: Mesh) -> None:
+async def test_metrics_include_all_services(mesh: Mesh) -> None:
     answer = await mesh.ask("GET", "/metrics")
     assert answer.headers["content-type"].startswith("text/plain; version=0.0.4")
     families = {f.name: f for f in text_string_to_metric_families(answer.text)}
@@ -343,7 +341,7 @@ async def test_metrics_are_those_of_all_services(mesh: Mesh) -> None:
     assert len(names) == len(set(names)), "a family once"
 
 
-async def test_the_openapi_document_has_every_path(mesh: Mesh) -> None:
+async def test_openapi_document_has_every_path(mesh: Mesh) -> None:
     document = (await mesh.ask("GET", "/openapi.json")).json()
     paths = {(method.upper(), path) for path, methods in document["paths"].items() for method in methods}
     one = "/v1/sessions/{session}"
@@ -370,14 +368,14 @@ async def test_the_openapi_document_has_every_path(mesh: Mesh) -> None:
             assert "422" not in operation["responses"], "the framework's own document is never answered"
 
 
-async def test_pages_for_people_are_there(mesh: Mesh) -> None:
+async def test_documentation_and_start_page_are_html(mesh: Mesh) -> None:
     for path in ("/docs", "/"):
         answer = await mesh.ask("GET", path)
         assert answer.status_code == 200
         assert answer.headers["content-type"].startswith("text/html")
 
 
-async def test_reads_at_the_same_moment_are_all_answered(mesh: Mesh) -> None:
+async def test_simultaneous_reads_are_all_answered(mesh: Mesh) -> None:
     session = await mesh.session()
     answers = await asyncio.gather(
         *(session.read("observation") for _ in range(20)), *(session.read("policy") for _ in range(20))

@@ -1,4 +1,4 @@
-"""``/readyz`` is about pairs as well: every reader reaches every owner that it reads."""
+"""Readiness of services, and of the links between readers and owners."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ def cut_off(service: str, *owners: str) -> Health:
     return Health(service=service, ready=False, detail=detail, unreached=list(owners))
 
 
-def test_everybody_answers_and_reaches_everybody() -> None:
+def test_mesh_is_ready_if_every_service_reaches_every_other() -> None:
     found = readiness(FINE, GATEWAY)
     assert (found["ready"], found["missing"], found["links"]) == (True, [], [])
     assert set(found["services"].values()) == {"ready"}
 
 
-def test_a_pair_that_does_not_reach_each_other_is_named_though_both_answer() -> None:
+def test_pair_without_a_link_is_named_even_if_both_answer() -> None:
     found = readiness(FINE | {"monitor": cut_off("monitor", "recorder")}, GATEWAY)
     assert (found["ready"], found["missing"]) == (False, ["monitor"])
     assert found["links"] == ["the monitor does not reach the recorder"]
     assert found["services"]["monitor"] == "the monitor does not reach the recorder"
 
 
-def test_a_service_that_answers_nobody_is_at_fault_and_not_those_who_miss_it() -> None:
+def test_service_that_answers_nobody_is_the_only_one_at_fault() -> None:
     answers = FINE | {"recorder": None, "monitor": cut_off("monitor", "recorder")}
     found = readiness(answers, cut_off("gateway", "recorder"))
     assert found["missing"] == ["recorder"]
@@ -36,6 +36,6 @@ def test_a_service_that_answers_nobody_is_at_fault_and_not_those_who_miss_it() -
     assert found["links"] == ["the monitor does not reach the recorder", "the gateway does not reach the recorder"]
 
 
-def test_what_a_service_waits_for_is_told() -> None:
+def test_reason_of_a_service_that_is_not_ready_is_reported() -> None:
     waiting = Health(service="learner", ready=False, detail="waits for the decider")
     assert readiness(FINE | {"learner": waiting}, GATEWAY)["services"]["learner"] == "waits for the decider"

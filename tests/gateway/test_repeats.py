@@ -1,4 +1,4 @@
-"""Commands that are sent again through the REST door: what a repeat gets, and what another content gets."""
+"""Repeated commands over REST: a repeat gets the first result, another content is refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from support.gateway_mesh import Mesh
 pytestmark = pytest.mark.anyio
 
 
-async def test_a_start_after_the_end_says_that_the_session_has_ended(mesh: Mesh) -> None:
+async def test_repeated_start_after_the_end_returns_the_ended_session(mesh: Mesh) -> None:
     body = {"participant": "P01", "session": "over", "seed": 7}
     first = (await mesh.ask("POST", "/v1/sessions", body)).json()
     end = (await mesh.ask("POST", "/v1/sessions/over/end")).json()
@@ -24,7 +24,7 @@ async def test_a_start_after_the_end_says_that_the_session_has_ended(mesh: Mesh)
     assert again.json() == first | changed
 
 
-async def test_a_start_while_the_session_is_ending_says_so(own_mesh: Mesh) -> None:
+async def test_repeated_start_during_the_end_returns_the_ending_session(own_mesh: Mesh) -> None:
     body = {"participant": "P01", "session": "slow"}
     assert (await own_mesh.ask("POST", "/v1/sessions", body)).json()["state"] == "live"
     await own_mesh.stop("learner")  # the end waits for it and gives up, and stays begun
@@ -33,7 +33,7 @@ async def test_a_start_while_the_session_is_ending_says_so(own_mesh: Mesh) -> No
     assert (again.status_code, again.json()["state"]) == (200, "ending")
 
 
-async def test_another_participant_under_a_used_session_is_told_of_both_also_after_the_end(mesh: Mesh) -> None:
+async def test_refusal_of_a_used_session_names_both_participants_even_after_the_end(mesh: Mesh) -> None:
     body = {"participant": "P01", "session": "used"}
     await mesh.ask("POST", "/v1/sessions", body)
     for _ in range(2):
@@ -70,7 +70,7 @@ PLAIN = {"negation": "affirmation", "hesitation": "none"}
     ],
     ids=["decide", "override", "mark", "report"],
 )
-async def test_an_id_with_another_content_is_a_conflict_that_names_both(
+async def test_id_with_another_content_is_a_conflict_that_names_both(
     mesh: Mesh, path: str, first: dict[str, Any], change: dict[str, Any], says: tuple[str, ...]
 ) -> None:
     session = await mesh.session()

@@ -1,4 +1,4 @@
-"""Each kind of body that clients send: taken, or refused with a sentence of its own."""
+"""Each kind of body that clients send: accepted, or refused with its own sentence."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ FORM = b'--x\r\nContent-Disposition: form-data; name="task"\r\n\r\ngrasp\r\n--x-
 @pytest.mark.parametrize(
     "kind", ["application/x-www-form-urlencoded", "text/plain", "application/json; charset=utf-8", "", "nonsense", None]
 )
-async def test_json_is_taken_whatever_it_is_called(mesh: Mesh, kind: str | None) -> None:
+async def test_json_is_accepted_with_any_content_type(mesh: Mesh, kind: str | None) -> None:
     headers = {} if kind is None else {"Content-Type": kind}
     assert (await mesh.ask("POST", "/v1/sessions", content=START, headers=headers)).status_code == 201
 
 
 @pytest.mark.parametrize("mark", ["\ufeff", " \n", ""])
-async def test_a_byte_order_mark_and_white_space_are_taken(mesh: Mesh, mark: str) -> None:
+async def test_byte_order_mark_and_white_space_are_accepted(mesh: Mesh, mark: str) -> None:
     assert (await mesh.ask("POST", "/v1/sessions", content=(mark + START + "\r\n").encode())).status_code == 201
     session = await mesh.session()
     async with gaze_socket(mesh, session.name) as socket:
@@ -43,7 +43,7 @@ async def test_a_byte_order_mark_and_white_space_are_taken(mesh: Mesh, mark: str
      (b'{"a":1,}', "line 1, column"), (b'{"a":\n True}', "line 2, column 2"), (b"[" * 50_000, "nesting")],
     ids=lambda v: ascii(v)[:30],
 )  # fmt: skip
-async def test_what_is_not_json_is_refused_with_its_own_sentence(mesh: Mesh, body: bytes, says: str) -> None:
+async def test_body_that_is_not_json_is_refused_with_its_own_sentence(mesh: Mesh, body: bytes, says: str) -> None:
     found = problem(await mesh.ask("POST", "/v1/sessions", content=body), 422)
     assert found["detail"].startswith("body: the body must be JSON: ")
     assert says in found["detail"]
@@ -56,12 +56,12 @@ async def test_what_is_not_json_is_refused_with_its_own_sentence(mesh: Mesh, bod
      ("hello", "a JSON string"), (7, "it is 7"), (True, "it is true")],
     ids=repr,
 )  # fmt: skip
-async def test_what_is_no_object_is_refused_with_its_own_sentence(mesh: Mesh, body: object, says: str) -> None:
+async def test_body_that_is_not_an_object_is_refused_with_its_own_sentence(mesh: Mesh, body: object, says: str) -> None:
     assert says in problem(await mesh.ask("POST", "/v1/sessions", content=json.dumps(body)), 422)["detail"]
 
 
 @pytest.mark.parametrize("encoding", ["gzip", "deflate", "br", "gzip, identity"])
-async def test_a_compressed_body_is_refused_as_such(mesh: Mesh, encoding: str) -> None:
+async def test_compressed_body_is_refused(mesh: Mesh, encoding: str) -> None:
     session = await mesh.session()
     for path in ("/v1/sessions", session.path("gaze")):
         headers = {"Content-Encoding": encoding}
@@ -69,20 +69,20 @@ async def test_a_compressed_body_is_refused_as_such(mesh: Mesh, encoding: str) -
         assert f"Content-Encoding: {encoding}" in problem(answer, 415)["detail"]
 
 
-async def test_values_in_the_address_are_shown_where_they_belong(mesh: Mesh) -> None:
+async def test_values_in_the_address_are_shown_as_a_body(mesh: Mesh) -> None:
     session = await mesh.session()
     found = problem(await mesh.ask("POST", session.path("decisions?task=grasp")), 422)
     assert 'into the body instead: {"task": "grasp"}' in found["detail"]
 
 
-async def test_a_get_says_that_its_body_is_not_read(mesh: Mesh) -> None:
+async def test_get_with_a_body_explains_that_it_is_not_read(mesh: Mesh) -> None:
     session = await mesh.session()
     found = problem(await mesh.ask("GET", session.path("strategy"), {"task": "grasp"}), 422)
     assert "task: it is missing; write it into the address" in found["detail"]
     assert "given 2 times" in problem(await session.get("strategy?task=a&task=b"), 422)["detail"]
 
 
-async def test_an_id_in_a_path_a_body_and_an_address_gets_the_same_proposal(mesh: Mesh) -> None:
+async def test_invalid_id_gets_the_same_proposal_everywhere(mesh: Mesh) -> None:
     session = await mesh.session()
     for answer in (
         await session.post("decisions", {"task": "Tasse füllen"}),

@@ -1,4 +1,4 @@
-"""Sessions, configuration and recordings through the REST door, field by field."""
+"""Sessions, configuration and recordings over REST, field by field."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.anyio
 # --- start ---
 
 
-async def test_a_start_answers_with_the_session(mesh: Mesh) -> None:
+async def test_start_answers_with_the_session(mesh: Mesh) -> None:
     body = {"participant": "P01", "session": "fields", "study": "coffee", "seed": 7, "condition": "adaptive"}
     answer = await mesh.ask("POST", "/v1/sessions", body)
     assert answer.status_code == 201
@@ -30,7 +30,7 @@ async def test_a_start_answers_with_the_session(mesh: Mesh) -> None:
     assert (await mesh.ask("GET", "/v1/sessions/fields")).json().items() >= expected.items()
 
 
-async def test_what_is_left_out_is_a_new_id_the_default_study_and_a_seed_of_the_id(mesh: Mesh) -> None:
+async def test_defaults_are_a_new_id_the_default_study_and_a_seed_of_the_id(mesh: Mesh) -> None:
     first = (await mesh.ask("POST", "/v1/sessions", {"participant": "P01"})).json()
     second = (await mesh.ask("POST", "/v1/sessions", {"participant": "P01"})).json()
     assert first["session"] != second["session"]
@@ -40,7 +40,7 @@ async def test_what_is_left_out_is_a_new_id_the_default_study_and_a_seed_of_the_
         assert answer["seed"] == int.from_bytes(digest[:6], "big"), "a restart gives the same"
 
 
-async def test_the_same_start_again_gets_the_first_result(mesh: Mesh) -> None:
+async def test_repeated_start_gets_the_first_result(mesh: Mesh) -> None:
     body = {"participant": "P01", "session": "again", "study": STUDY}
     first = await mesh.ask("POST", "/v1/sessions", body)
     again = await mesh.ask("POST", "/v1/sessions", body)
@@ -51,7 +51,7 @@ async def test_the_same_start_again_gets_the_first_result(mesh: Mesh) -> None:
 @pytest.mark.parametrize(
     "change", [{"participant": "P02"}, {"study": "coffee"}, {"seed": 8}, {"condition": "control"}], ids=str
 )
-async def test_a_session_that_is_there_with_another_content_is_a_conflict(mesh: Mesh, change: dict[str, Any]) -> None:
+async def test_used_session_with_another_content_is_a_conflict(mesh: Mesh, change: dict[str, Any]) -> None:
     session = await mesh.session(STUDY)
     body = {"participant": "P01", "session": session.name, "study": STUDY, "seed": 7}
     assert (await mesh.ask("POST", "/v1/sessions", body)).status_code == 200
@@ -59,7 +59,7 @@ async def test_a_session_that_is_there_with_another_content_is_a_conflict(mesh: 
     assert answer.status_code == 409
 
 
-async def test_a_study_object_and_its_condition_are_in_force(mesh: Mesh) -> None:
+async def test_study_object_and_its_condition_are_in_force(mesh: Mesh) -> None:
     control = await mesh.session(STUDY, condition="control")
     config = await control.read("config")
     assert (config["study"], config["learner"]["name"], config["version"]) == ("mine", "scoring", 1)
@@ -81,16 +81,14 @@ async def test_a_study_object_and_its_condition_are_in_force(mesh: Mesh) -> None
      ({"participant": None}, "participant", "valid string"), ({"color": "red"}, "color", "not permitted")],
     ids=str,
 )  # fmt: skip
-async def test_a_start_that_is_nonsense_is_refused_by_field(
-    mesh: Mesh, change: dict[str, Any], field: str, says: str
-) -> None:
+async def test_invalid_start_is_refused_by_field(mesh: Mesh, change: dict[str, Any], field: str, says: str) -> None:
     answer = await mesh.ask("POST", "/v1/sessions", {"participant": "P01", "study": STUDY, **change})
     assert answer.status_code == 422
     found = next(e for e in answer.json()["errors"] if e["field"] == field)
     assert says in found["rule"]
 
 
-async def test_a_study_of_the_data_folder_is_found_by_its_name(mesh: Mesh) -> None:
+async def test_study_of_the_data_folder_is_found_by_its_name(mesh: Mesh) -> None:
     (mesh.data / "studies").mkdir(exist_ok=True)
     (mesh.data / "studies" / "own.yaml").write_text("study: own\ntasks: [dig]\n")
     (mesh.data / "studies" / "broken.yaml").write_text("study: broken\nreward:\n  decay: fast\n")
@@ -119,7 +117,7 @@ async def test_every_session_is_listed_with_its_counts(mesh: Mesh) -> None:
 
 
 @pytest.mark.parametrize("media", ["application/json", "application/merge-patch+json"])
-async def test_a_merge_patch_changes_the_study_in_force(mesh: Mesh, media: str) -> None:
+async def test_merge_patch_changes_the_study_in_force(mesh: Mesh, media: str) -> None:
     session = await mesh.session(STUDY)
     before = await session.read("config")
     patch = {"reward": {"scale": 2.0}, "scoring": {"strategies": {"negation": {"weight": 1.25}}}}
@@ -136,12 +134,12 @@ async def test_a_merge_patch_changes_the_study_in_force(mesh: Mesh, media: str) 
     assert (await session.report(decision["decision_id"], seconds=0.0))["reward"] == 2.0
 
 
-async def test_a_null_is_the_default_again(mesh: Mesh) -> None:
+async def test_null_restores_the_default(mesh: Mesh) -> None:
     session = await mesh.session(STUDY | {"reward": {"decay": 0.2}})
     assert (await session.configure({"reward": None})).json()["reward"] == {"decay": 0.1, "scale": 1.0}
 
 
-async def test_the_whole_document_can_be_sent_back_as_it_was_read(mesh: Mesh) -> None:
+async def test_whole_configuration_can_be_sent_back_as_it_was_read(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     config = await session.read("config")
     config["decider"]["wait_s"] = 3.0
@@ -165,7 +163,7 @@ async def test_the_whole_document_can_be_sent_back_as_it_was_read(mesh: Mesh) ->
      ({"interactions": 9, "title": "t", "reward": {"scale": 2}}, ["title", "interactions"])],
     ids=str,
 )  # fmt: skip
-async def test_what_is_fixed_is_refused_by_name_and_nothing_changes(
+async def test_change_of_a_fixed_value_is_refused_by_name_and_has_no_effect(
     mesh: Mesh, patch: dict[str, Any], names: list[str]
 ) -> None:
     session = await mesh.session(STUDY)
@@ -181,7 +179,7 @@ async def test_what_is_fixed_is_refused_by_name_and_nothing_changes(
     [[], 1, None, "x", {"reward": {"decay": -1}}, {"reward": {"zzz": 1}}, {"zzz": 1}, {"reward": 5}, {"study": None}],
     ids=str,
 )
-async def test_a_patch_that_is_nonsense_is_refused(mesh: Mesh, patch: Any) -> None:
+async def test_invalid_patch_is_refused(mesh: Mesh, patch: Any) -> None:
     session = await mesh.session(STUDY)
     answer = await mesh.ask("PATCH", session.path("config"), content=json.dumps(patch))
     assert answer.status_code == 422
@@ -192,7 +190,7 @@ async def test_a_patch_that_is_nonsense_is_refused(mesh: Mesh, patch: Any) -> No
 # --- the end, and recordings ---
 
 
-async def test_an_end_answers_with_the_finished_recording(mesh: Mesh) -> None:
+async def test_end_answers_with_the_finished_recording(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     decision = await session.decide()
     await session.look(["robot", "cup", None])
@@ -215,7 +213,7 @@ async def test_an_end_answers_with_the_finished_recording(mesh: Mesh) -> None:
     assert shown["ended"] == {"sec": START_NS // 10**9, "nsec": 0}
 
 
-async def test_the_recording_holds_what_was_counted(mesh: Mesh) -> None:
+async def test_recording_has_the_counted_messages(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     await session.decide()
     ended = await session.end()
@@ -239,13 +237,13 @@ async def test_recordings_are_listed(mesh: Mesh) -> None:
 @pytest.mark.parametrize(
     "name", ["nobody.mcap", "x", "..%2Fstate%2Frecorder.sqlite", "%2e%2e.mcap", "a%00.mcap", "**.mcap", ".mcap"]
 )
-async def test_a_recording_that_is_not_there_is_unknown(mesh: Mesh, name: str) -> None:
+async def test_missing_recording_is_404(mesh: Mesh, name: str) -> None:
     answer = await mesh.ask("GET", f"/v1/recordings/{name}")
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
 
 
-async def test_an_ended_session_takes_nothing_and_can_be_read(mesh: Mesh) -> None:
+async def test_ended_session_accepts_no_input_and_can_be_read(mesh: Mesh) -> None:
     session = await mesh.session(STUDY)
     decision = await session.decide(decision_id="d1")
     reported = await session.report("d1")
@@ -267,7 +265,7 @@ async def test_an_ended_session_takes_nothing_and_can_be_read(mesh: Mesh) -> Non
     assert (await session.read("observation"))["session"] == session.name
 
 
-async def test_a_start_without_a_condition_is_warned_about_where_the_study_has_some(mesh: Mesh) -> None:
+async def test_start_without_a_condition_gets_a_warning_if_the_study_has_conditions(mesh: Mesh) -> None:
     study = {"study": "x", "conditions": {"control": {"learner": {"name": "scoring"}}, "adaptive": {}}}
     body = {"participant": "P01", "study": study}
     answer = await mesh.http.post("/v1/sessions", json=body)
@@ -283,7 +281,7 @@ async def test_a_start_without_a_condition_is_warned_about_where_the_study_has_s
     assert nonsense.status_code == 422
 
 
-async def test_what_is_doubtful_in_a_study_is_said_at_its_start(mesh: Mesh) -> None:
+async def test_start_of_a_doubtful_study_gets_its_warnings(mesh: Mesh) -> None:
     study = {"study": "x", "fixation": {"distance_cm": 650}}
     answer = await mesh.http.post("/v1/sessions", json={"participant": "P01", "study": study})
     assert answer.status_code == 201

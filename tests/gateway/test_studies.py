@@ -1,4 +1,4 @@
-"""``/v1/studies``: studies checked without a session, and starts that refuse what a check refuses."""
+"""``/v1/studies``: studies are checked without a session, and a start refuses what the check refuses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BOW_TIE = "study: bow\naois:\n  - {name: cup, polygon: [[0.2, 0.2], [0.8, 0.8], 
 
 @pytest.fixture
 def folder(mesh: Mesh) -> Iterator[Path]:
-    """The folder of studies, with one that is fine, one that is doubtful and one with a mistake."""
+    """Return a folder of studies: a valid one, a doubtful one, and one with a mistake."""
     folder = mesh.data / "studies"
     folder.mkdir(exist_ok=True)
     (folder / "own.yaml").write_text("study: own\ntitle: My own\nconditions: {on: {}, off: {}, 01: {}}\n")
@@ -46,7 +46,7 @@ async def test_one_study_is_answered_whole(mesh: Mesh, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["cofee", "..%2Fown", "own.yaml", "%00"])
-async def test_an_unknown_study_is_404(mesh: Mesh, folder: Path, name: str) -> None:
+async def test_unknown_study_is_404(mesh: Mesh, folder: Path, name: str) -> None:
     answer = await mesh.ask("GET", f"/v1/studies/{name}")
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
@@ -55,7 +55,7 @@ async def test_an_unknown_study_is_404(mesh: Mesh, folder: Path, name: str) -> N
         assert [(e["field"], e["value"]) for e in answer.json()["errors"]] == [("study", "cofee")]
 
 
-async def test_a_study_with_mistakes_is_422_as_at_a_start(mesh: Mesh, folder: Path) -> None:
+async def test_study_with_mistakes_is_422_as_at_a_start(mesh: Mesh, folder: Path) -> None:
     read = await mesh.ask("GET", "/v1/studies/bow")
     start = await mesh.ask("POST", "/v1/sessions", {"participant": "P01", "study": "bow"})
     assert read.status_code == start.status_code == 422
@@ -64,14 +64,14 @@ async def test_a_study_with_mistakes_is_422_as_at_a_start(mesh: Mesh, folder: Pa
     assert read.json()["errors"][0]["value"] == "cup"
 
 
-async def test_a_given_study_with_such_an_area_is_422_with_the_name(mesh: Mesh) -> None:
+async def test_given_study_with_an_impossible_area_is_422_with_the_name(mesh: Mesh) -> None:
     study = {"study": "x", "aois": [{"name": "cup", "polygon": [[0.2, 0.2], [0.5, 0.5], [0.8, 0.8]]}]}
     answer = await mesh.ask("POST", "/v1/sessions", {"participant": "P01", "study": study})
     assert answer.status_code == 422
     assert "aois.0.polygon: cup is flat" in answer.json()["detail"]
 
 
-async def test_conditions_are_those_that_are_written(mesh: Mesh, folder: Path) -> None:
+async def test_conditions_are_as_the_file_has_them(mesh: Mesh, folder: Path) -> None:
     for condition in ("on", "off", "01"):
         start = {"participant": "P01", "study": "own", "condition": condition}
         assert (await mesh.ask("POST", "/v1/sessions", start)).status_code == 201

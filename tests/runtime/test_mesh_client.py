@@ -1,4 +1,4 @@
-"""The mesh client: it sends again with the same id, and says who does not answer and what was refused."""
+"""The mesh client: it repeats a request with the same id, and names the service that does not answer or refuses."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ async def bus() -> MemoryBus:
     return MemoryBus(Hub())
 
 
-async def test_an_answer_comes_back_as_it_was_given(bus: MemoryBus) -> None:
+async def test_answer_is_returned_unchanged(bus: MemoryBus) -> None:
     bus.serve("shift/v1/*/rpc/decide", lambda r: r.reply(encode(ANSWER)))
     assert await MeshClient(bus).command(DECIDE) == ANSWER
 
 
-async def test_a_command_without_a_reply_is_sent_again_with_the_same_id(bus: MemoryBus) -> None:
+async def test_command_without_a_reply_is_sent_again_with_the_same_id(bus: MemoryBus) -> None:
     asked: list[Request] = []
 
     def third_time(request: Request) -> None:
@@ -52,14 +52,14 @@ async def test_a_command_without_a_reply_is_sent_again_with_the_same_id(bus: Mem
     assert len({r.payload for r in asked}) == 1
 
 
-async def test_a_service_that_comes_back_in_time_answers(bus: MemoryBus) -> None:
+async def test_service_that_comes_back_in_time_answers(bus: MemoryBus) -> None:
     asking = asyncio.create_task(MeshClient(bus).command(DECIDE))
     await asyncio.sleep(0.05)
     bus.serve(KEY, lambda r: r.reply(encode(ANSWER)))
     assert await asking == ANSWER
 
 
-async def test_nobody_there_is_a_failure_that_names_the_service(bus: MemoryBus) -> None:
+async def test_missing_service_is_a_failure_that_names_it(bus: MemoryBus) -> None:
     client = MeshClient(bus, patience_s=0.05)
     with pytest.raises(Unavailable, match="the decider does not answer"):
         await client.command(DECIDE)
@@ -67,7 +67,7 @@ async def test_nobody_there_is_a_failure_that_names_the_service(bus: MemoryBus) 
         await client.gaze("s1", GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["left"]))
 
 
-async def test_a_silent_service_is_a_failure_that_names_it(bus: MemoryBus) -> None:
+async def test_silent_service_is_a_failure_that_names_it(bus: MemoryBus) -> None:
     silent: list[Request] = []
     bus.serve(KEY, silent.append)
     with pytest.raises(Unavailable, match="the decider does not answer"):
@@ -75,12 +75,12 @@ async def test_a_silent_service_is_a_failure_that_names_it(bus: MemoryBus) -> No
     assert len(silent) >= 2
 
 
-async def test_patience_is_as_much_longer_as_the_service_may_wait(bus: MemoryBus) -> None:
+async def test_patience_grows_by_the_service_s_own_wait(bus: MemoryBus) -> None:
     bus.serve(KEY, lambda r: asyncio.get_running_loop().call_later(0.04, r.reply, encode(ANSWER)))
     assert await MeshClient(bus, patience_s=0.0).command(DECIDE, wait_s=1.0) == ANSWER
 
 
-async def test_a_refusal_arrives_as_the_error_that_it_was_and_is_not_asked_again(bus: MemoryBus) -> None:
+async def test_refusal_arrives_as_the_same_error_and_is_not_retried(bus: MemoryBus) -> None:
     asked: list[Request] = []
     errors = (FieldError(field="task", value="x", rule="no"),)
 
@@ -97,7 +97,7 @@ async def test_a_refusal_arrives_as_the_error_that_it_was_and_is_not_asked_again
 
 @pytest.mark.parametrize("junk", [b"", b"Timeout", b"\xff", b"{}", encode(OutboxQuery())])
 @pytest.mark.parametrize("ok", [True, False])
-async def test_what_is_no_answer_counts_as_none(bus: MemoryBus, junk: bytes, ok: bool) -> None:
+async def test_invalid_answer_is_ignored(bus: MemoryBus, junk: bytes, ok: bool) -> None:
     bus.serve(KEY, lambda r: r.reply(junk) if ok else r.refuse(junk))
     with pytest.raises(Unavailable):
         await MeshClient(bus, patience_s=0.05).command(DECIDE)
@@ -105,14 +105,14 @@ async def test_what_is_no_answer_counts_as_none(bus: MemoryBus, junk: bytes, ok:
     assert await MeshClient(bus).command(DECIDE) == ANSWER
 
 
-async def test_a_session_that_is_no_id_is_refused_before_anybody_is_asked(bus: MemoryBus) -> None:
+async def test_session_that_is_not_an_id_is_refused_before_a_request(bus: MemoryBus) -> None:
     chunk = GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["left"])
     for hostile in ("**", "*", "a/b", "../x", "a\0", "x" * 64, ""):
         with pytest.raises(MalformedMessage):
             await MeshClient(bus).gaze(hostile, chunk)
 
 
-async def test_health_and_metrics_are_none_and_nothing_without_an_answer(bus: MemoryBus) -> None:
+async def test_health_is_none_and_metrics_are_empty_without_an_answer(bus: MemoryBus) -> None:
     client = MeshClient(bus)
     assert await client.health("monitor", 0.02) is None
     assert await client.metrics("monitor", 0.02) == b""
@@ -127,7 +127,7 @@ async def test_health_and_metrics_are_none_and_nothing_without_an_answer(bus: Me
     assert await client.metrics("monitor") == b"# text"
 
 
-async def test_attempts_that_time_out_while_the_service_waits_still_carry_the_command_out_once(tmp_path: Path) -> None:
+async def test_command_is_carried_out_once_even_if_attempts_time_out(tmp_path: Path) -> None:
     rig = Rig(tmp_path / "decider.sqlite")
     rig.recorder.publish(session(), config())
     rig.start()

@@ -1,4 +1,4 @@
-"""The REST client, at a small HTTP server that says what it is told to."""
+"""The REST client, with a small HTTP server whose answers the tests set."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from shift_schemas.messages import Command, Configure, GazeChunk, Mark
 
 @dataclass
 class Gateway:
-    """Answers with what is in ``answers``, one after the other; the last one for ever."""
+    """Answers with the entries of ``answers`` in turn, and then always with the last one."""
 
     answers: list[tuple[int, Any]] = field(default_factory=lambda: [(200, {})])
     asked: list[tuple[str, str, Any]] = field(default_factory=list)
@@ -92,7 +92,7 @@ def shift(gateway: Gateway) -> Iterator[RestClient]:
         yield client
 
 
-def test_each_method_asks_its_path(gateway: Gateway, shift: RestClient) -> None:
+def test_each_method_requests_its_path(gateway: Gateway, shift: RestClient) -> None:
     shift.start("P1", session="s1", study="coffee", seed=7, condition=None)
     shift.gaze("s1", GazeChunk(source="eyes", seq=0, t=[0.0], x=[0.5], y=[None]))
     shift.decide("s1", "grasp", "d1")
@@ -142,9 +142,7 @@ def test_command_without_a_path_is_refused(gateway: Gateway, shift: RestClient) 
     assert gateway.asked == []
 
 
-def test_a_command_without_an_id_of_its_own_is_given_one_that_stays_in_every_attempt(
-    gateway: Gateway, shift: RestClient
-) -> None:
+def test_command_without_an_id_gets_one_that_is_the_same_in_every_attempt(gateway: Gateway, shift: RestClient) -> None:
     gateway.answers = [problem("unavailable", "the decider does not answer", 503), (0, None), (201, {"n": 1})]
     assert shift.decide("s1", "grasp") == {"n": 1}
     ids = {body["decision_id"] for _, _, body in gateway.asked}
@@ -160,7 +158,7 @@ def test_a_command_without_an_id_of_its_own_is_given_one_that_stays_in_every_att
     ("kind", "status", "error"),
     [("conflict", 409, Conflict), ("unknown", 404, UnknownThing), ("malformed", 422, MalformedMessage)],
 )
-def test_a_problem_arrives_as_the_error_that_it_was_and_is_not_asked_again(
+def test_problem_arrives_as_the_same_error_and_is_not_retried(
     gateway: Gateway, shift: RestClient, kind: str, status: int, error: type[ShiftError]
 ) -> None:
     errors = [{"field": "task", "value": "x", "rule": "one of them"}]
@@ -171,7 +169,7 @@ def test_a_problem_arrives_as_the_error_that_it_was_and_is_not_asked_again(
     assert len(gateway.asked) == 1
 
 
-def test_every_field_of_a_problem_is_handed_on(gateway: Gateway, shift: RestClient) -> None:
+def test_every_field_of_a_problem_is_in_the_error(gateway: Gateway, shift: RestClient) -> None:
     errors = [{"field": f"{part}.duration_s", "value": "-1", "rule": "at least 0"} for part in ("one", "other")]
     gateway.answers = [problem("malformed", "one.duration_s: at least 0", 422, errors)]
     with pytest.raises(MalformedMessage, match=r"one\.duration_s: at least 0") as found:
@@ -179,7 +177,7 @@ def test_every_field_of_a_problem_is_handed_on(gateway: Gateway, shift: RestClie
     assert [e.field for e in found.value.errors] == ["one.duration_s", "other.duration_s"]
 
 
-def test_an_answer_that_takes_too_long_is_named_with_its_limit(gateway: Gateway) -> None:
+def test_timeout_names_its_limit(gateway: Gateway) -> None:
     gateway.answers = [(-1, None)]
     limit = r"did not answer GET /v1/sessions/s1 within 0\.2 s"
     with RestClient(gateway.url, patience_s=0.0, timeout_s=0.2) as shift, pytest.raises(Unavailable, match=limit):
@@ -187,7 +185,7 @@ def test_an_answer_that_takes_too_long_is_named_with_its_limit(gateway: Gateway)
 
 
 @pytest.mark.parametrize("session", ["P 01", "a/b", "..", "", "ü", "x" * 64, "s1?x"])
-def test_a_session_that_is_not_an_id_never_becomes_another_path(
+def test_session_that_is_not_an_id_is_refused_before_a_request(
     gateway: Gateway, shift: RestClient, session: str
 ) -> None:
     asking = (
@@ -209,7 +207,7 @@ def test_a_session_that_is_not_an_id_never_becomes_another_path(
 
 
 @pytest.mark.parametrize("seconds", [float("nan"), float("inf"), object()], ids=str)
-def test_what_json_cannot_say_is_refused_before_it_is_sent(gateway: Gateway, shift: RestClient, seconds: Any) -> None:
+def test_value_that_is_not_json_is_refused_before_a_request(gateway: Gateway, shift: RestClient, seconds: Any) -> None:
     with pytest.raises(MalformedMessage, match="cannot be sent as JSON"):
         shift.report("s1", "d1", True, seconds, True, 5.0)
     with pytest.raises(MalformedMessage, match="cannot be sent as JSON"):
@@ -218,19 +216,19 @@ def test_what_json_cannot_say_is_refused_before_it_is_sent(gateway: Gateway, shi
 
 
 @pytest.mark.parametrize("url", ["127.0.0.1:8080", "", "http://", "ftp://x", "http://a\x00b"])
-def test_a_url_that_cannot_be_a_gateway_s_is_refused_at_once(url: str) -> None:
+def test_invalid_url_is_refused_at_once(url: str) -> None:
     with pytest.raises(InvalidSettings, match="the gateway's URL is"):
         RestClient(url)
 
 
-def test_what_stays_unavailable_is_said_in_the_end(gateway: Gateway) -> None:
+def test_service_that_stays_unavailable_is_named_at_the_end(gateway: Gateway) -> None:
     gateway.answers = [problem("unavailable", "the monitor does not answer", 503)]
     with RestClient(gateway.url, patience_s=0.2) as shift, pytest.raises(Unavailable, match="the monitor does not"):
         shift.observation("s1")
     assert len(gateway.asked) > 1
 
 
-def test_without_a_gateway_it_says_which_one_does_not_answer(gateway: Gateway) -> None:
+def test_missing_gateway_is_named(gateway: Gateway) -> None:
     with RestClient("http://127.0.0.1:1", patience_s=0.1) as shift:
         with pytest.raises(Unavailable, match=r"no gateway answers at http://127\.0\.0\.1:1"):
             shift.session("s1")
@@ -239,16 +237,14 @@ def test_without_a_gateway_it_says_which_one_does_not_answer(gateway: Gateway) -
 
 
 @pytest.mark.parametrize("content", [b"<html>Bad gateway</html>", b"", [], {"detail": "no type"}, "text"])
-def test_an_error_that_does_not_say_why_is_an_error_all_the_same(
-    gateway: Gateway, shift: RestClient, content: Any
-) -> None:
+def test_error_without_a_problem_document_is_still_an_error(gateway: Gateway, shift: RestClient, content: Any) -> None:
     gateway.answers = [(500, content)]
     with pytest.raises(ShiftError, match="is not a SHIFT gateway: it answered GET /v1/sessions/s1 with 500"):
         shift.session("s1")
 
 
 @pytest.mark.parametrize("content", [b"<html>welcome</html>", b"", b"[1]", b'"text"'])
-def test_another_server_on_the_port_is_no_gateway(gateway: Gateway, shift: RestClient, content: bytes) -> None:
+def test_another_server_on_the_port_is_not_a_gateway(gateway: Gateway, shift: RestClient, content: bytes) -> None:
     gateway.answers = [(200, content)]
     with pytest.raises(ShiftError, match="is not a SHIFT gateway"):
         shift.session("s1")
@@ -256,6 +252,6 @@ def test_another_server_on_the_port_is_no_gateway(gateway: Gateway, shift: RestC
         shift.ready()
 
 
-def test_ready_is_told_whether_it_is_so_or_not(gateway: Gateway, shift: RestClient) -> None:
+def test_readiness_is_returned_even_if_the_mesh_is_not_ready(gateway: Gateway, shift: RestClient) -> None:
     gateway.answers = [(503, {"ready": False, "missing": ["monitor"], "services": {}})]
     assert shift.ready()["missing"] == ["monitor"]

@@ -1,4 +1,4 @@
-"""Studies by name: the data folder's before the built-in ones, and a name is nothing but a name."""
+"""Studies by name: files of the data folder replace built-in studies, and a name is never a path."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from shift_study.study import Study
 
 
 def started(name: str, folder: Path) -> Study:
-    """The study that a start with this name would have."""
+    """Return the study that a start with this name would have."""
     return study_of(study_to_start(name, folder).data)
 
 
 def refusal(name: str, folder: Path) -> str:
-    """What is said of a start with this name."""
+    """Return the refusal of a start with this name."""
     with pytest.raises(InvalidStudy) as refused:
         study_to_start(name, folder)
     assert len(refused.value.detail) < 600
     return refused.value.detail
 
 
-def test_the_built_in_ones_are_coffee_and_default(tmp_path: Path) -> None:
+def test_built_in_studies_are_coffee_and_default(tmp_path: Path) -> None:
     coffee, default = started("coffee", tmp_path), started("default", tmp_path)
     assert coffee.tasks == ["grasp", "turn", "pour"]
     assert list(coffee.conditions) == ["control", "adaptive"]
@@ -33,31 +33,31 @@ def test_the_built_in_ones_are_coffee_and_default(tmp_path: Path) -> None:
     assert default.aoi_names == ("left", "middle", "right")
 
 
-def test_the_default_study_has_every_default(tmp_path: Path) -> None:
+def test_default_study_has_every_default(tmp_path: Path) -> None:
     plain, default = study_data(Study(study="default")), study_to_start("default", tmp_path).data
     assert default == plain | {"title": default["title"]}
 
 
-def test_without_a_folder_there_are_the_built_in_ones(tmp_path: Path) -> None:
+def test_without_a_folder_only_built_in_studies_exist(tmp_path: Path) -> None:
     assert started("coffee", tmp_path / "nowhere").study == "coffee"
 
 
 @pytest.mark.parametrize("suffix", [".yaml", ".yml", ".YAML", ".Yml", ".json", ".JSON"])
-def test_a_file_of_the_folder_is_found_by_its_name_and_goes_before_a_built_in_one(tmp_path: Path, suffix: str) -> None:
+def test_file_of_the_folder_replaces_a_built_in_study(tmp_path: Path, suffix: str) -> None:
     (tmp_path / f"own{suffix}").write_text('{"study": "own", "interactions": 7}')
     (tmp_path / f"coffee{suffix}").write_text('{"study": "coffee", "interactions": 8}')
     assert started("own", tmp_path).interactions == 7
     assert started("coffee", tmp_path).interactions == 8
 
 
-def test_a_json_file_may_be_indented_with_tabs(tmp_path: Path) -> None:
+def test_json_file_may_be_indented_with_tabs(tmp_path: Path) -> None:
     data = {"study": "own", "title": "Küche 🍵 a: b, 'c'", "tasks": ["1", "on"], "reward": {"decay": 0.2}}
     (tmp_path / "own.json").write_text(json.dumps(data, indent="\t"))
     own = started("own", tmp_path)
     assert (own.title, own.tasks, own.reward.decay) == (data["title"], ["1", "on"], 0.2)
 
 
-def test_an_unknown_name_is_refused_with_those_that_there_are_and_the_nearest(tmp_path: Path) -> None:
+def test_unknown_name_is_refused_with_the_known_names_and_the_nearest(tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text("study: own\n")
     (tmp_path / "notes.txt").write_text("study: notes\n")
     with pytest.raises(InvalidStudy, match="there are coffee, default, own; did you mean 'coffee'") as refused:
@@ -69,29 +69,29 @@ def test_an_unknown_name_is_refused_with_those_that_there_are_and_the_nearest(tm
 @pytest.mark.parametrize(
     "name", ["../own", "**", "own.yaml", "", "own\0", "own\n", "/etc/passwd", "x" * 65536], ids=lambda n: ascii(n)[:20]
 )
-def test_a_name_that_is_no_id_is_refused_and_no_file_is_looked_for(tmp_path: Path, name: str) -> None:
+def test_name_that_is_not_an_id_is_refused_without_a_search(tmp_path: Path, name: str) -> None:
     (tmp_path / "own.yaml").write_text("study: own\n")
     assert "name is an id" in refusal(name, tmp_path / "inner")
 
 
-def test_a_mistake_is_said_with_the_file_s_name_and_line(tmp_path: Path) -> None:
+def test_mistake_names_file_and_line(tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text("study: own\nlearner:\n  epsilon: 7\n")
     assert refusal("own", tmp_path).startswith("own.yaml:3: learner.epsilon: '7' is not valid: it must be at most 1")
 
 
-def test_a_mistake_in_one_file_is_nobody_else_s(tmp_path: Path) -> None:
+def test_mistake_in_one_file_does_not_affect_others(tmp_path: Path) -> None:
     (tmp_path / "aaa.yaml").write_text("{{{")
     (tmp_path / "own.yaml").write_text("study: own\n")
     assert started("own", tmp_path).study == "own"
 
 
-def test_two_files_of_one_name_are_refused_with_both(tmp_path: Path) -> None:
+def test_two_files_of_one_name_are_refused_and_both_are_named(tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text("study: own\ninteractions: 7\n")
     (tmp_path / "own.json").write_text('{"study": "own"}')
     assert "own.json and own.yaml have the same name; keep one of them" in refusal("own", tmp_path)
 
 
-def test_an_area_that_no_gaze_can_hit_is_refused_at_a_start_by_name_and_by_value(tmp_path: Path) -> None:
+def test_area_that_no_gaze_can_hit_is_refused_at_a_start(tmp_path: Path) -> None:
     crossed = {"name": "cup", "polygon": [[0.2, 0.2], [0.8, 0.8], [0.8, 0.2], [0.2, 0.8]]}
     study = {"study": "own", "aois": [crossed]}
     (tmp_path / "own.yaml").write_text(json.dumps(study))
@@ -115,14 +115,14 @@ def test_an_area_that_no_gaze_can_hit_is_refused_at_a_start_by_name_and_by_value
      (b"study: own\n# " + b"x" * LARGEST_BYTES, "own.yaml has 256 KB; a study has at most 256 KB")],
     ids=["latin-1", "latin-1-text", "utf-16", "utf-16-be", "utf-32", "binary", "large"],
 )  # fmt: skip
-def test_a_file_that_is_not_utf_8_is_refused_with_what_to_do(tmp_path: Path, raw: bytes, says: str) -> None:
+def test_file_that_is_not_utf_8_is_refused_with_what_to_do(tmp_path: Path, raw: bytes, says: str) -> None:
     (tmp_path / "own.yaml").write_bytes(raw)
     assert says in refusal("own", tmp_path)
 
 
 @pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"], ids=["plain", "bom"])
 @pytest.mark.parametrize("newline", [b"\n", b"\r\n", b"\r"], ids=["unix", "windows", "mac"])
-def test_a_byte_order_mark_and_other_line_ends_change_nothing(tmp_path: Path, bom: bytes, newline: bytes) -> None:
+def test_byte_order_mark_and_line_ends_have_no_effect(tmp_path: Path, bom: bytes, newline: bytes) -> None:
     lines = ["study: own", "title: Küche", "tasks:", "  - grasp", "  - turn", ""]
     (tmp_path / "own.yaml").write_bytes(bom + newline.join(line.encode() for line in lines))
     own = started("own", tmp_path)
@@ -149,7 +149,7 @@ def test_every_study_is_listed_with_title_place_mistakes_and_warnings(tmp_path: 
     assert "rename it to my-study.yaml" in found["my study"].mistakes[0]
 
 
-def test_a_study_that_is_named_otherwise_than_its_file_is_warned_about_with_both_names(tmp_path: Path) -> None:
+def test_study_with_another_name_than_its_file_gets_a_warning_with_both_names(tmp_path: Path) -> None:
     (tmp_path / "pilot.yaml").write_text("study: coffee\n")
     _, warnings = study_to_start("pilot", tmp_path)
     assert len(warnings) == 1
@@ -159,6 +159,6 @@ def test_a_study_that_is_named_otherwise_than_its_file_is_warned_about_with_both
     assert find_study("pilo", tmp_path) is None
 
 
-def test_a_study_that_is_given_at_a_start_is_warned_about_too(tmp_path: Path) -> None:
+def test_study_object_at_a_start_gets_warnings(tmp_path: Path) -> None:
     assert study_to_start({"study": "x"}, tmp_path).warnings == ()
     assert len(study_to_start({"study": "x", "fixation": {"distance_cm": 650}}, tmp_path).warnings) == 1

@@ -1,4 +1,4 @@
-"""Payloads: what a peer may send is decoded or refused as malformed, never anything else."""
+"""Payloads: any payload is either decoded or refused as malformed."""
 
 import json
 
@@ -23,20 +23,20 @@ def test_encodings_name_the_message_and_its_version() -> None:
     assert encoding_of(Decision) == "application/json;shift.Decision.v1"
 
 
-def test_a_message_survives_the_wire() -> None:
+def test_decoding_is_the_inverse_of_encoding() -> None:
     message = decode(Decide, DECIDE)
     assert decode(Decide, encode(message)) == message
 
 
 @pytest.mark.parametrize("result", [{}, {"n": 7, "reason": "größer als {}"}, {"of": {"a": [{}]}}])
 @pytest.mark.parametrize("repeat", [True, False])
-def test_an_answer_around_a_result_that_is_json_already_is_that_answer(result: dict[str, object], repeat: bool) -> None:
+def test_answer_with_an_encoded_result_decodes_to_that_answer(result: dict[str, object], repeat: bool) -> None:
     payload = encode_answer("decider", 3, repeat, json.dumps(result))
     assert decode(Answer, payload) == Answer(owner="decider", seq=3, repeat=repeat, result=result)
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999", "-1e999", "true", "false", '"0.5"', "[]"])
-def test_what_is_no_finite_number_is_refused(number: str) -> None:
+def test_number_that_is_not_finite_is_refused(number: str) -> None:
     for text in (
         CHUNK % (0, f"[{number}]", "[0.5]"),
         CHUNK % (0, "[0]", f"[{number}]"),
@@ -59,7 +59,7 @@ def test_what_is_no_finite_number_is_refused(number: str) -> None:
      DECIDE.replace("grasp", "g" * 70_000).encode(), DECIDE.replace("d1", "../x").encode(), DECIDE.encode("utf-16")],
     ids=lambda p: ascii(p[:16]),
 )  # fmt: skip
-def test_nonsense_is_malformed_and_not_said_back_at_length(payload: bytes) -> None:
+def test_nonsense_is_malformed_and_the_error_stays_short(payload: bytes) -> None:
     with pytest.raises(MalformedMessage) as refused:
         decode(Decide, payload)
     assert len(refused.value.detail) < 500
@@ -67,7 +67,7 @@ def test_nonsense_is_malformed_and_not_said_back_at_length(payload: bytes) -> No
 
 
 @pytest.mark.parametrize("depth", [40, 200, 500])
-def test_a_patch_that_could_not_be_said_back_is_refused_when_it_comes(depth: int) -> None:
+def test_patch_that_is_nested_too_deep_is_refused(depth: int) -> None:
     for patch in ('{"a":' * depth + "1" + "}" * depth, '{"a":' + "[" * depth + "]" * depth + "}"):
         with pytest.raises(MalformedMessage):
             decode(Configure, CONFIGURE + patch + "}")
@@ -83,7 +83,7 @@ def test_any_payload_is_decoded_or_malformed(kind: type[BaseModel], payload: byt
 
 
 @given(st.sampled_from(["task", "command_id", "session", "need"]), json_values)
-def test_a_field_of_any_type_is_taken_or_malformed(field: str, value: object) -> None:
+def test_field_of_any_type_is_accepted_or_malformed(field: str, value: object) -> None:
     try:
         message = decode(Decide, json.dumps(json.loads(DECIDE) | {field: value}))
     except MalformedMessage:

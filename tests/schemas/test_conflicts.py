@@ -1,4 +1,4 @@
-"""A command id that is used again with another content: the refusal says what differs and what to do."""
+"""A command id with another content: the refusal names the differences and the remedy."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def start(**given: Any) -> StartSession:
     ],
     ids=str,
 )
-def test_a_start_under_a_used_session_names_both_values(
+def test_start_under_a_used_session_names_both_values(
     before: dict[str, Any], now: dict[str, Any], then_says: str, now_says: str
 ) -> None:
     said = refused(start(**before), start(**now))
@@ -93,11 +93,11 @@ def test_a_start_under_a_used_session_names_both_values(
     ],
     ids=["decide", "mark", "override", "report"],
 )  # fmt: skip
-def test_every_command_names_its_thing_what_differs_and_what_to_do(before: Command, now: Command, says: str) -> None:
+def test_refusal_names_the_thing_the_difference_and_the_remedy(before: Command, now: Command, says: str) -> None:
     assert refused(before, now) == says
 
 
-def test_the_fields_that_differ_come_as_errors_too() -> None:
+def test_differing_fields_are_errors_of_their_own() -> None:
     found = repeat_conflict(start(participant="P02", seed=7), start().content())
     assert [(e.field, e.value, e.rule) for e in found.errors] == [
         ("participant", "P02", "it was P01 the first time"),
@@ -106,25 +106,25 @@ def test_the_fields_that_differ_come_as_errors_too() -> None:
     assert found.status == 409
 
 
-def test_many_differences_and_long_values_stay_one_short_sentence() -> None:
+def test_many_differences_and_long_values_make_one_short_sentence() -> None:
     many = {f"k{i}": "x" * 5000 for i in range(100)}
     said = refused(start(study={"study": "x"}), start(study={"study": "x", **many}))
     assert "and 96 more" in said
     assert len(said) < 1000
 
 
-def test_where_only_a_digest_is_known_the_thing_and_the_remedy_are_still_named() -> None:
+def test_refusal_without_the_first_content_names_the_thing_and_the_remedy() -> None:
     found = repeat_conflict(start(), "0123456789abcdef")
     assert found.detail == "session s1 is there already, with another content. Choose another session id."
 
 
 @pytest.mark.parametrize("procedure", COMMANDS)
-def test_each_command_of_the_mesh_has_words_of_its_own(procedure: str) -> None:
+def test_each_command_has_its_own_wording(procedure: str) -> None:
     command = COMMANDS[procedure].model_construct(command_id="c1", session="s1")
     assert not repeat_conflict(command, "").detail.startswith(f"{procedure} c1 was asked")
 
 
-def test_an_end_is_always_the_same_content() -> None:
+def test_end_always_has_the_same_content() -> None:
     assert differences(*[EndSession(command_id="end", session="s1").content()] * 2) == []
 
 
@@ -133,7 +133,7 @@ JSON = st.recursive(st.none() | st.booleans() | st.integers(-5, 5) | st.text(max
 
 
 @given(st.dictionaries(st.sampled_from("abc"), JSON))
-def test_a_content_does_not_differ_from_itself_in_another_order(content: dict[str, Any]) -> None:
+def test_another_order_of_the_fields_is_not_a_difference(content: dict[str, Any]) -> None:
     import json
 
     turned = dict(reversed(content.items()))

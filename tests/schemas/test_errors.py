@@ -1,4 +1,4 @@
-"""Errors travel as problems and arrive as what they were."""
+"""Errors travel as problems and arrive as the same errors."""
 
 import pytest
 from hypothesis import given
@@ -30,27 +30,25 @@ words = st.text(st.characters(exclude_categories=["Cs"]), max_size=50)
 
 
 @given(st.sampled_from(list(STATUS)), words, st.lists(st.builds(FieldError, field=words, value=words, rule=words)))
-def test_a_problem_arrives_as_the_error_that_it_was(
-    kind: type[ShiftError], detail: str, errors: list[FieldError]
-) -> None:
+def test_problem_arrives_as_the_same_error(kind: type[ShiftError], detail: str, errors: list[FieldError]) -> None:
     sent = kind(detail, tuple(errors))
     arrived = decode(Problem, encode(Problem.of(sent))).error()
     assert type(arrived) is kind
     assert (arrived.detail, arrived.errors, arrived.status) == (sent.detail, sent.errors, STATUS[kind])
 
 
-def test_a_problem_of_a_newer_kind_is_an_error_all_the_same() -> None:
+def test_problem_of_an_unknown_kind_is_a_plain_error() -> None:
     assert type(Problem(kind="from-the-future", detail="?").error()) is ShiftError
 
 
 @given(st.text() | st.integers() | st.floats() | st.lists(st.text()))
-def test_a_value_said_back_is_short_and_printable(value: object) -> None:
+def test_shortened_value_is_short_and_printable(value: object) -> None:
     said = shorten(value)
     assert len(said) <= VALUE_LENGTH
     assert said.isprintable()
 
 
-def test_a_long_value_is_cut_and_shows_it() -> None:
+def test_long_value_is_truncated_with_an_ellipsis() -> None:
     assert shorten("x" * 65536) == "x" * (VALUE_LENGTH - 1) + "…"
     assert shorten("\ud800\0") == "��"
 
@@ -68,7 +66,7 @@ def test_every_mistake_has_field_value_and_rule() -> None:
     assert [(e.field, e.value) for e in error.errors] == [("a", "x" * (VALUE_LENGTH - 1) + "…"), ("b", "")]
 
 
-def test_a_hundred_mistakes_are_not_all_said() -> None:
+def test_at_most_20_mistakes_are_listed() -> None:
     with pytest.raises(ValidationError) as found:
         _Many.model_validate({"numbers": ["x"] * 100})
     assert len(malformed("body", found.value).errors) == 20

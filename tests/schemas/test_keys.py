@@ -1,4 +1,4 @@
-"""Keys: building and parsing are inverses, and nothing else parses."""
+"""Keys: building and parsing are inverses, and no other text parses."""
 
 import pytest
 from hypothesis import example, given
@@ -45,7 +45,7 @@ def test_parsing_is_the_inverse_of_building(key: Key) -> None:
 @given(
     st.lists(parts, max_size=7).map("/".join) | st.lists(parts, max_size=4).map(lambda p: "/".join(["shift/v1", *p]))
 )
-def test_what_parses_is_a_key_that_is_built_to_the_same_text(text: str) -> None:
+def test_parsed_key_is_built_to_the_same_text(text: str) -> None:
     try:
         key = parse_key(text)
     except MalformedMessage:
@@ -54,7 +54,7 @@ def test_what_parses_is_a_key_that_is_built_to_the_same_text(text: str) -> None:
 
 
 @given(st.text(max_size=60))
-def test_any_other_text_is_no_key(text: str) -> None:
+def test_any_other_text_is_not_a_key(text: str) -> None:
     with pytest.raises(MalformedMessage):
         parse_key(text)
 
@@ -75,6 +75,6 @@ def test_hostile_sessions_are_neither_built_nor_parsed(session: str) -> None:
     [FactKey("s1", "gaze/x"), FactKey("s1", "*"), StreamKey("s1", "decision"), CommandKey("s1", "gaze"),
      ServiceKey("stranger", "health"), ServiceKey("decider", "**")],
 )  # fmt: skip
-def test_unknown_words_make_no_key(key: Key) -> None:
+def test_key_with_an_unknown_name_is_refused(key: Key) -> None:
     with pytest.raises(MalformedMessage):
         build_key(key)

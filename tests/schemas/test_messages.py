@@ -29,7 +29,7 @@ NAMES: dict[str, Any] = {"source": "ros", "seq": 0, "t": [0.0, 0.1], "aoi": ["ro
      NAMES | {"aoi": [None, None]}, POINTS | {"x": [0, 1], "y": [0, 1]}, POINTS | {"x": [-0.3, 1.4], "y": [0.1, 0.1]},
      NAMES | {"seq": 2**53}],
 )  # fmt: skip
-def test_points_or_names_make_a_chunk(chunk: dict[str, Any]) -> None:
+def test_chunk_has_points_or_names(chunk: dict[str, Any]) -> None:
     assert GazeChunk.model_validate(chunk).t == [0.0, 0.1]
 
 
@@ -44,12 +44,12 @@ def test_points_or_names_make_a_chunk(chunk: dict[str, Any]) -> None:
      ({"seq": 0.5}, "integer"), ({"source": "a/b"}, "match pattern"), ({"t": [0.0, True]}, "number"),
      ({"valid": [1, 0]}, "boolean"), ({"pupil": [3.0, 3.0]}, "not permitted")],
 )  # fmt: skip
-def test_columns_that_do_not_fit_are_refused(change: dict[str, Any], says: str) -> None:
+def test_columns_of_different_length_or_content_are_refused(change: dict[str, Any], says: str) -> None:
     with pytest.raises(ValidationError, match=says):
         GazeChunk.model_validate(POINTS | change)
 
 
-def test_names_come_without_points() -> None:
+def test_chunk_of_names_has_no_points() -> None:
     for column in ("x", "y", "valid"):
         with pytest.raises(ValidationError, match="either aoi"):
             GazeChunk.model_validate(NAMES | {column: [0.0, 0.0] if column != "valid" else [True, True]})
@@ -58,12 +58,12 @@ def test_names_come_without_points() -> None:
 
 
 @pytest.mark.parametrize("duration", [-0.1, float("nan"), float("inf"), 1e7, True, "5"])
-def test_a_duration_is_a_sensible_number_of_seconds(duration: object) -> None:
+def test_invalid_duration_is_refused(duration: object) -> None:
     with pytest.raises(ValidationError):
         Result.model_validate({"success": True, "duration_s": duration})
 
 
-def test_facts_are_frozen_and_every_field_is_known() -> None:
+def test_facts_are_frozen_and_refuse_unknown_fields() -> None:
     for kind in FACTS.values():
         assert kind.model_config.get("frozen")
         assert kind.model_config.get("extra") == "forbid"
@@ -72,14 +72,14 @@ def test_facts_are_frozen_and_every_field_is_known() -> None:
         seen.decision = 2  # type: ignore[misc]
 
 
-def test_a_repeat_is_the_same_content_whatever_the_door_had_seen_since() -> None:
+def test_content_of_a_repeat_does_not_depend_on_what_was_read() -> None:
     first = Decide(command_id="d1", session="s1", task="grasp", need=Seen(decision=1))
     again = Decide(command_id="d1", session="s1", task="grasp", need=Seen(decision=2))
     other = Decide(command_id="d1", session="s1", task="turn", need=Seen(decision=1))
     assert first.content() == again.content() != other.content()
 
 
-def test_the_order_of_strategies_makes_no_other_override() -> None:
+def test_order_of_the_strategies_does_not_change_an_override() -> None:
     levels = {"negation": "negation", "hesitation": "none"}
     first = SetOverride(command_id="o1", session="s1", task="grasp", strategy=levels)
     turned = SetOverride(command_id="o1", session="s1", task="grasp", strategy=dict(reversed(levels.items())))
@@ -93,13 +93,13 @@ def test_every_report_names_both_dimensions() -> None:
         )
 
 
-def test_policies_know_the_contract_s_learners() -> None:
+def test_policy_accepts_the_contract_s_learners() -> None:
     learners = Policy.model_json_schema()["properties"]["learner"]["enum"]
     assert learners == ["scoring", "q-learning", "epsilon-greedy", "ucb1", "thompson", "linear-thompson", "planner"]
 
 
 @pytest.mark.parametrize("value", [float("inf"), float("nan"), "\ud800", {"\ud800": 1}, [[float("-inf")]]])
-def test_a_patch_holds_only_what_json_can_say(value: object) -> None:
+def test_patch_that_is_not_json_is_refused(value: object) -> None:
     with pytest.raises(ValidationError):
         Configure(command_id="c1", session="s1", patch={"a": value})
 
@@ -114,7 +114,7 @@ seens = st.builds(
 
 
 @given(seens, seens)
-def test_what_covers_the_other_has_no_count_below_it(a: Seen, b: Seen) -> None:
+def test_seen_covers_another_if_no_count_is_below(a: Seen, b: Seen) -> None:
     mine, needed = a.model_dump(), b.model_dump()
     gaze, wanted = mine.pop("gaze"), needed.pop("gaze")
     below = [name for name in needed if mine[name] < needed[name]]
@@ -123,6 +123,6 @@ def test_what_covers_the_other_has_no_count_below_it(a: Seen, b: Seen) -> None:
     assert covers(a, a)
 
 
-def test_chunk_0_of_a_source_is_more_than_none() -> None:
+def test_chunk_0_of_a_source_is_more_than_no_chunk() -> None:
     assert not covers(Seen(), Seen(gaze={"tx300": 0}))
     assert covers(Seen(gaze={"tx300": 0}), Seen(gaze={"tx300": 0}))

@@ -60,7 +60,7 @@ def test_tables_are_in_the_order_of_the_owners() -> None:
     assert STREAMS == {"gaze": "monitor"}
 
 
-def test_a_service_reads_the_owner_of_each_subject_that_it_steps_on() -> None:
+def test_service_reads_the_owner_of_each_subject_that_it_steps_on() -> None:
     for reads in READS.values():
         for owner, subjects in reads.items():
             assert subjects <= set(OWNERS[owner])

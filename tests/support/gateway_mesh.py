@@ -1,7 +1,7 @@
-"""A whole mesh in one process: four workers with journals of their own and the gateway, over the in-memory bus.
+"""A whole mesh in one process: four workers with their own journals, and the gateway, over the in-memory bus.
 
-``asking`` is an HTTP client without a network. What HTTPX cannot do without one, streams and WebSockets, is done
-by hand: the application is called as a server would call it.
+The HTTP client needs no network. HTTPX cannot read streams and WebSockets in this way, so for these the application is
+called as a server would call it.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from shift_runtime.settings import MeshSettings
 
 CORES: dict[str, Core[Any]] = {core.name: core for core in (RECORDER, MONITOR, DECIDER, LEARNER)}
 START_NS = 1_700_000_000_000_000_000
-NOT_FOR_EVER_S = 30.0
-"""Only so that a test that would hang fails; nothing is asserted about it."""
+HANG_LIMIT_S = 30.0
+"""The time after which a test that hangs fails, seconds. No test asserts anything about it."""
 
 
 @dataclass
 class Service:
-    """One running worker."""
+    """A running worker with its bus and journal."""
 
     worker: Worker[Any]
     task: asyncio.Task[None]
@@ -50,7 +50,7 @@ class Service:
     journal: Journal
 
     async def stop(self) -> None:
-        """As a signal would."""
+        """Stop the worker as a signal would."""
         self.worker.stop()
         await self.task
         await self.bus.close()
@@ -59,7 +59,7 @@ class Service:
 
 @dataclass
 class Mesh:
-    """What a test holds of it."""
+    """The running mesh, as a test uses it."""
 
     data: Path
     hub: Hub
@@ -70,7 +70,7 @@ class Mesh:
     numbers: Any = field(default_factory=lambda: itertools.count(1))
 
     def start(self, name: str) -> None:
-        """Run a service on its journal."""
+        """Start a service on its journal."""
         bus = MemoryBus(self.hub)
         journal = Journal(self.data / "state" / f"{name}.sqlite", name, CORES[name].lookups)
         extend = partial(extend_recorder, settings=MeshSettings(data=self.data)) if name == "recorder" else None
@@ -78,17 +78,17 @@ class Mesh:
         self.services[name] = Service(worker, asyncio.create_task(worker.run()), bus, journal)
 
     async def stop(self, name: str) -> None:
-        """Stop a service; its journal stays."""
+        """Stop a service and keep its journal."""
         await self.services.pop(name).stop()
 
     async def ask(self, method: str, path: str, body: Any = None, **given: Any) -> httpx.Response:
-        """One request."""
+        """Send one request."""
         if body is not None:
             given["json"] = body
         return await self.http.request(method, path, **given)
 
     async def session(self, study: Any = "default", **given: Any) -> Session:
-        """A new session."""
+        """Begin a new session."""
         name = f"s{next(self.numbers)}"
         body = {"participant": "P01", "session": name, "study": study, "seed": 7, **given}
         answer = await self.ask("POST", "/v1/sessions", body)
@@ -98,7 +98,7 @@ class Mesh:
 
 @dataclass
 class Session:
-    """One session, as a client of REST has it."""
+    """One session, as a REST client uses it."""
 
     mesh: Mesh
     name: str
@@ -106,39 +106,39 @@ class Session:
     clock_s: float = 0.0
 
     def path(self, tail: str = "") -> str:
-        """``/v1/sessions/{name}/tail``."""
+        """Return ``/v1/sessions/{name}/tail``."""
         return f"/v1/sessions/{self.name}" + (f"/{tail}" if tail else "")
 
     async def get(self, tail: str = "") -> Any:
-        """What a read answers, fine or not."""
+        """Return the response to a read, whatever its status."""
         return await self.mesh.ask("GET", self.path(tail))
 
     async def read(self, tail: str = "") -> Any:
-        """What a read answers."""
+        """Return the answer to a read that succeeds."""
         answer = await self.get(tail)
         assert answer.status_code == 200, answer.text
         return answer.json()
 
     async def post(self, tail: str, body: Any = None) -> httpx.Response:
-        """What a command answers, fine or not."""
+        """Return the response to a command, whatever its status."""
         return await self.mesh.ask("POST", self.path(tail), body)
 
     async def done(self, tail: str, body: Any = None) -> Any:
-        """What a command answers."""
+        """Return the answer to a command that succeeds."""
         answer = await self.post(tail, body)
         assert answer.status_code in (200, 201, 202), answer.text
         return answer.json()
 
     async def decide(self, task: str = "grasp", **given: Any) -> Any:
-        """A decision."""
+        """Make a decision."""
         return await self.done("decisions", {"task": task, **given})
 
     async def report(self, decision_id: str, understood: bool = True, able: bool = True, seconds: float = 5.0) -> Any:
-        """A performance."""
+        """Report a performance."""
         return await self.done("performance", performance(decision_id, understood, able, seconds))
 
     async def look(self, aois: list[str | None], step_s: float = 0.5, source: str = "ros") -> Any:
-        """A chunk of AOI names, ``step_s`` apart."""
+        """Send a chunk of AOI names, ``step_s`` apart."""
         t = [self.clock_s + i * step_s for i in range(len(aois))]
         self.clock_s = t[-1] + step_s
         seq = self.chunks.get(source, 0)
@@ -146,16 +146,16 @@ class Session:
         return await self.done("gaze", {"source": source, "seq": seq, "t": t, "aoi": aois})
 
     async def configure(self, patch: Any) -> httpx.Response:
-        """A patch of the configuration."""
+        """Patch the configuration."""
         return await self.mesh.ask("PATCH", self.path("config"), patch)
 
     async def end(self) -> Any:
-        """The end."""
+        """End the session."""
         return await self.done("end")
 
 
 def performance(decision_id: str, understood: bool = True, able: bool = True, seconds: float = 5.0) -> dict[str, Any]:
-    """A report's body."""
+    """Return the body of a report."""
     return {
         "decision_id": decision_id,
         "comprehension": {"success": understood, "duration_s": seconds},
@@ -165,7 +165,7 @@ def performance(decision_id: str, understood: bool = True, able: bool = True, se
 
 @asynccontextmanager
 async def running_mesh(data: Path, patience_s: float = 1.0) -> AsyncIterator[Mesh]:
-    """The mesh, until left; all is stopped then."""
+    """Run the mesh until the context is left."""
     hub, clock = Hub(), ManualClock(START_NS)
 
     async def open_bus() -> Bus:
@@ -189,30 +189,30 @@ async def _stop_all(mesh: Mesh) -> None:
 
 async def until_ready(mesh: Mesh) -> None:
     """Wait until ``/readyz`` is true."""
-    async with asyncio.timeout(NOT_FOR_EVER_S):
+    async with asyncio.timeout(HANG_LIMIT_S):
         while (await mesh.ask("GET", "/readyz")).status_code != 200:  # noqa: ASYNC110 - readiness has no event
             await asyncio.sleep(0.005)
 
 
-# --- streams and WebSockets, by hand ---
+# --- streams and WebSockets ---
 
 
 @dataclass
 class Call:
-    """The application, called for one connection."""
+    """A call of the application for one connection."""
 
     scope: dict[str, Any]
     incoming: asyncio.Queue[dict[str, Any]] = field(default_factory=asyncio.Queue)
     outgoing: asyncio.Queue[dict[str, Any]] = field(default_factory=asyncio.Queue)
 
     async def next(self) -> dict[str, Any]:
-        """What it sends next."""
-        return await asyncio.wait_for(self.outgoing.get(), NOT_FOR_EVER_S)
+        """Return the next message that the application sends."""
+        return await asyncio.wait_for(self.outgoing.get(), HANG_LIMIT_S)
 
 
 @asynccontextmanager
 async def called(mesh: Mesh, kind: str, path: str) -> AsyncIterator[Call]:
-    """A connection until left; then the client hangs up."""
+    """Open a connection. The client closes it when the context is left."""
     scope = {
         "type": kind, "path": path, "raw_path": path.encode(), "query_string": b"", "headers": [], "method": "GET",
         "scheme": "ws" if kind == "websocket" else "http", "http_version": "1.1", "root_path": "",
@@ -225,12 +225,12 @@ async def called(mesh: Mesh, kind: str, path: str) -> AsyncIterator[Call]:
         yield call
     finally:
         await call.incoming.put({"type": "http.disconnect" if kind == "http" else "websocket.disconnect", "code": 1000})
-        await asyncio.wait_for(task, NOT_FOR_EVER_S)
+        await asyncio.wait_for(task, HANG_LIMIT_S)
 
 
 @asynccontextmanager
 async def events_of(session: Session) -> AsyncIterator[AsyncIterator[tuple[str, Any]]]:
-    """The session's server-sent events, as (event, data)."""
+    """Yield the session's server-sent events, as (event, data)."""
     async with called(session.mesh, "http", session.path("events")) as call:
         await call.incoming.put({"type": "http.request", "body": b"", "more_body": False})
         start = await call.next()
@@ -256,7 +256,7 @@ class Socket:
     call: Call
 
     async def send(self, message: Any) -> Any:
-        """Send a message (bytes, text or an object as JSON); the answer."""
+        """Send a message (bytes, text or an object as JSON). Return the answer."""
         if isinstance(message, bytes):
             await self.call.incoming.put({"type": "websocket.receive", "bytes": message})
         else:
@@ -269,7 +269,7 @@ class Socket:
 
 @asynccontextmanager
 async def gaze_socket(mesh: Mesh, session: str) -> AsyncIterator[Socket]:
-    """A WebSocket on the session's gaze."""
+    """Open a WebSocket for the session's gaze."""
     async with called(mesh, "websocket", f"/v1/sessions/{session}/gaze") as call:
         await call.incoming.put({"type": "websocket.connect"})
         assert (await call.next())["type"] == "websocket.accept"
@@ -287,7 +287,7 @@ PLAIN, NEGATED = {"negation": "affirmation", "hesitation": "none"}, {"negation":
 
 
 def problem(answer: httpx.Response, status: int) -> dict[str, Any]:
-    """The problem document of an answer, which has its shape."""
+    """Return the problem document of an answer, after checking its shape."""
     assert answer.status_code == status, answer.text[:500]
     assert answer.headers["content-type"] == "application/problem+json"
     found: dict[str, Any] = answer.json()

@@ -1,4 +1,4 @@
-"""What hypothesis makes: ids, hostile ids, and JSON of any shape."""
+"""Hypothesis strategies: ids, hostile ids, and JSON of any shape."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ HOSTILE_IDS = (
     "", "**", "*", "a/b", "../x", "..", ".", "a\0", "\0", "a\n", "\na", "a b", " a", "-a", "_a", "a.b", "@service",
     "a" * 64, "a" * 65536, "ä", "a\u200b", "%2e%2e", "a$", "\ud800", "Ａ",
 )  # fmt: skip
-"""What Zenoh, a file system or a URL would take as something else, and what only looks like an id."""
+"""Texts that Zenoh, a file system or a URL would misread, and texts that only look like ids."""
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),

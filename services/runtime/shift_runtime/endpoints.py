@@ -1,6 +1,6 @@
-"""Addresses that a person writes: Zenoh endpoints (``tcp/127.0.0.1:7447``) and URLs of the gateway.
+"""Addresses that a person writes: Zenoh endpoints (``tcp/127.0.0.1:7447``) and URLs of the gateway. Pure.
 
-They are checked here, before anything is opened, so that a mistake is answered with the value, the rule and an example.
+They are checked here before anything is opened. An error names the value, the rule and an example.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def parse_endpoint(text: str, name: str = "the endpoint") -> tuple[str, int]:
     Raises
     ------
     InvalidSettings
-        ``text`` is not an endpoint. The sentence begins with ``name``: the flag or variable that it was given with.
+        ``text`` is not an endpoint. The sentence begins with ``name``, the flag or variable of the value.
     """
     protocol, _, rest = text.partition("/")
     host, _, port = rest.partition("?")[0].partition("#")[0].rpartition(":")
@@ -32,13 +32,13 @@ def parse_endpoint(text: str, name: str = "the endpoint") -> tuple[str, int]:
 
 
 def check_url(text: str, name: str = "the gateway's URL") -> str:
-    """Return the gateway's URL without a slash at its end. Raise :class:`InvalidSettings` where it is not a URL."""
+    """Return the gateway's URL without a slash at its end. Raise :class:`InvalidSettings` if it is not a URL."""
     try:
         parts = urlsplit(text)
-        fine = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+        valid = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
     except ValueError:  # a port that is not a number up to 65535, or a bracket that is not closed
-        fine = False
-    if not fine or any(c.isspace() for c in text):
+        valid = False
+    if not valid or any(c.isspace() for c in text):
         raise InvalidSettings(
             f"{name} is {shorten(text)!r}: write http:// or https://, the host and the port, "
             "such as http://127.0.0.1:8080"

@@ -1,8 +1,8 @@
-"""``python -m shift_runtime.healthcheck SERVICE``: exit code 0 where the service answers and is ready.
+"""``python -m shift_runtime.healthcheck SERVICE``: exit with 0 if the service answers and is ready.
 
-For containers, every few seconds, so it imports little: Zenoh and the standard library. A service is asked
-over Zenoh, through its worker's own loop; the gateway by ``/readyz``; the router by a connection; the simulated
-person by whether it could reach the gateway (``SHIFT_URL``).
+Containers run it every few seconds, so it imports only Zenoh and the standard library. It asks a service over Zenoh,
+through the loop that does the service's work; it asks the gateway for ``/readyz``, and connects to the router. The
+simulated person is healthy if the gateway (``SHIFT_URL``) answers.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ CHECKED = ("router", "gateway", "recorder", "monitor", "decider", "learner", "si
 
 
 def main(arguments: list[str]) -> int:
-    """The exit code for ``[service]``; 2 for wrong use."""
+    """Check the one service in ``arguments``. Return the exit code: 0 healthy, 1 not healthy, 2 wrong use."""
     if len(arguments) != 1 or arguments[0] not in CHECKED:
         sys.stderr.write(f"give one service: {', '.join(CHECKED)}\n")
         return 2

@@ -1,7 +1,7 @@
-"""Studies by name: the files in ``data/studies`` and the built-in ones, read, checked and listed.
+"""Studies by name: read, check and list the files in ``data/studies`` and the built-in studies.
 
-A file is found by its name without the extension (``.yaml``, ``.yml`` or ``.json``, in upper or lower case) and goes
-before a built-in study of the same name.
+The name of a study is its file's name without the extension (``.yaml``, ``.yml`` or ``.json``, in upper or lower case).
+A file replaces a built-in study of the same name.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from shift_study.study import Study
 
 SUFFIXES = (".yaml", ".yml", ".json")
 LARGEST_BYTES = 256 * 1024
-"""Of a study file; as of a study in the body of a request."""
+"""The largest size of a study file; the same as of a study in the body of a request."""
 BUILT_IN = "built-in"
 
 
 class CheckedStudy(NamedTuple):
-    """A study file as it was read. ``study`` is ``None`` where there are mistakes."""
+    """A study file as it was read. ``study`` is ``None`` if there are mistakes."""
 
     name: str
-    """By which sessions are started with it: the file's name without the extension."""
+    """The name with which sessions are started: the file's name without the extension."""
     place: str
     """The file, or ``built-in``."""
     study: Study | None
@@ -41,37 +41,37 @@ class CheckedStudy(NamedTuple):
 
     @property
     def title(self) -> str:
-        """The study's title, empty where it has none or could not be read."""
+        """The study's title; empty if it has no title or could not be read."""
         return self.study.title if self.study is not None else ""
 
 
 def check_file(path: Traversable, place: str) -> CheckedStudy:
-    """Read and check one study file. Mistakes are returned, not raised."""
+    """Read and check one study file. Return its mistakes instead of raising them."""
     name = _stem(path)
     try:
         _check_name(name, path.name)
         study = parse_study(_text(path), path.name)
     except InvalidStudy as e:
         return CheckedStudy(name, place, None, e.sentences, (), e)
-    return CheckedStudy(name, place, study, (), (*_named_otherwise(study, path), *study_warnings(study)), None)
+    return CheckedStudy(name, place, study, (), (*_name_warnings(study, path), *study_warnings(study)), None)
 
 
 def list_studies(folder: Path) -> list[CheckedStudy]:
-    """Return every study, checked, by its name; a file of the folder hides a built-in one of the same name."""
+    """Return every study, checked, sorted by name. A file of the folder replaces a built-in study of the same name."""
     found: dict[str, CheckedStudy] = {}
     for name, paths in _by_name(folder).items():
-        found[name] = _one_of(name, paths)
+        found[name] = _the_only(name, paths)
     return [found[name] for name in sorted(found)]
 
 
 def find_study(name: str, folder: Path) -> CheckedStudy | None:
-    """Return the study of that name, checked; ``None`` where there is none."""
+    """Return the study of that name, checked; ``None`` if no study has this name."""
     paths = _by_name(folder).get(name)
-    return _one_of(name, paths) if paths else None
+    return _the_only(name, paths) if paths else None
 
 
 def study_names(folder: Path) -> tuple[str, ...]:
-    """Return the names of all studies, sorted; nothing is read."""
+    """Return the names of all studies, sorted, without reading the files."""
     return tuple(sorted(_by_name(folder)))
 
 
@@ -81,7 +81,7 @@ def named_study(name: str, folder: Path) -> CheckedStudy:
     Raises
     ------
     InvalidStudy
-        There is none of that name (those that there are are named), or its file has a mistake.
+        No study has this name (the sentence lists the known names), or its file has a mistake.
     """
     if not is_id(name):
         raise _refused(name, f"a study's name is an id: {ID_RULE}")
@@ -94,13 +94,13 @@ def named_study(name: str, folder: Path) -> CheckedStudy:
 
 
 def unknown_study(name: str, folder: Path) -> str:
-    """Return the sentence for a name that no study has."""
+    """Return the sentence for a name that no study has, with the known names."""
     known = study_names(folder)
     return f"there is no study of that name; there are {', '.join(known)}{did_you_mean(name, known)}"
 
 
 class StudyToStart(NamedTuple):
-    """The study that a start names or gives."""
+    """The study with which a session starts."""
 
     data: dict[str, Any]
     """A plain object with every default written out."""
@@ -108,9 +108,9 @@ class StudyToStart(NamedTuple):
 
 
 def study_to_start(given: str | dict[str, Any], folder: Path) -> StudyToStart:
-    """Return the study that a start names or gives, checked.
+    """Return the study that a start names, or contains, checked.
 
-    Raises :class:`InvalidStudy` where there is none of that name, or it has a mistake.
+    Raise :class:`InvalidStudy` if no study has this name, or the study has a mistake.
     """
     if isinstance(given, str):
         found = named_study(given, folder)
@@ -124,7 +124,7 @@ def study_to_start(given: str | dict[str, Any], folder: Path) -> StudyToStart:
 
 
 def _by_name(folder: Path) -> dict[str, list[tuple[Traversable, str]]]:
-    """The files of each name, of the folder's or else of the built-in ones."""
+    """Return the files of each name: those of the folder, otherwise the built-in one."""
     found: dict[str, list[tuple[Traversable, str]]] = {}
     for path in _files(folder):
         found.setdefault(_stem(path), []).append((path, str(path)))
@@ -144,7 +144,7 @@ def _stem(path: Traversable) -> str:
     return path.name.rsplit(".", 1)[0]
 
 
-def _one_of(name: str, paths: list[tuple[Traversable, str]]) -> CheckedStudy:
+def _the_only(name: str, paths: list[tuple[Traversable, str]]) -> CheckedStudy:
     if len(paths) == 1:
         return check_file(*paths[0])
     names = " and ".join(path.name for path, _ in paths)
@@ -159,8 +159,8 @@ def _check_name(stem: str, file: str) -> None:
         raise InvalidStudy(f"{file}: {rule}", (FieldError(field="study", value=shorten(stem), rule=rule),))
 
 
-def _named_otherwise(study: Study, path: Traversable) -> Iterator[str]:
-    """A warning and no mistake: a file that was copied or renamed is a study all the same, and starts as before."""
+def _name_warnings(study: Study, path: Traversable) -> Iterator[str]:
+    """Warn if the file has another name than its study. It is not a mistake: a copied or renamed file still starts."""
     stem = _stem(path)
     if study.study != stem:
         yield (
@@ -184,13 +184,13 @@ def _text(path: Traversable) -> str:
         raise InvalidStudy(f"{path.name} cannot be read: {e.strerror}") from e
     if len(raw) > LARGEST_BYTES:
         raise InvalidStudy(f"{path.name} has {len(raw) // 1024} KB; a study has at most {LARGEST_BYTES // 1024} KB")
-    return decoded(raw, path.name)
+    return decode_text(raw, path.name)
 
 
-def decoded(raw: bytes, name: str) -> str:
+def decode_text(raw: bytes, name: str) -> str:
     """Return the text of a UTF-8 file, with or without a byte order mark.
 
-    Raises :class:`InvalidStudy` that says which encoding the file probably has, and to save it as UTF-8.
+    Raise :class:`InvalidStudy` for another encoding; the sentence names it, and says to save the file as UTF-8.
     """
     if encoding := _wide_encoding(raw):
         raise InvalidStudy(f"{name}: the file is {encoding}; save it as UTF-8")

@@ -54,7 +54,7 @@ class Transaction:
 
     @property
     def must_commit(self) -> bool:
-        """Whether a change is visible outside. Cursors alone need no commit: reading the same facts again has no effect."""
+        """Whether a change is visible outside. Cursors alone need no commit: reading facts again has no effect."""
         batch = self.batch
         return bool(batch.rows or batch.answers or batch.closed) or any(not reply.repeat for reply in self.replies)
 
