@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import TRIPLES, Triple
-from support.gateway_mesh import NEGATED, PLAIN, STUDY, Mesh, Session, events_of, gaze_socket, performance
+from support.gateway_mesh import NEGATED, PLAIN, STUDY, Mesh, Session, gaze_socket, performance
 
 pytestmark = pytest.mark.anyio
 ACTIONS = [
@@ -451,26 +451,6 @@ async def test_simultaneous_sessions_are_independent(mesh: Mesh) -> None:
         assert (await session.read())["counts"]["decision"] == rounds
     ends = await asyncio.gather(one.end(), two.end())
     assert [e["counts"]["performance"] for e in ends] == [8, 5]
-
-
-async def test_event_stream_has_the_facts_of_the_session(mesh: Mesh) -> None:
-    session, other = await mesh.session(), await mesh.session()
-    async with events_of(session) as events:
-        await other.decide()
-        decision = await session.decide(decision_id="d1")
-        await session.report("d1")
-        seen: dict[str, Any] = {}
-        async for name, data in events:
-            assert data["session"] == session.name
-            seen.setdefault(name, data)
-            if {"decision", "performance", "transition", "policy", "observation"} <= seen.keys():
-                break
-    assert seen["decision"]["decision_id"] == "d1"
-    assert seen["decision"]["strategy"] == decision["strategy"]
-
-
-async def test_event_stream_of_an_unknown_session_is_404(mesh: Mesh) -> None:
-    assert (await mesh.ask("GET", "/v1/sessions/nobody/events")).status_code == 404
 
 
 # --- all 30 triples ---

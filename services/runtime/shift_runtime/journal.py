@@ -94,6 +94,12 @@ class Journal:
         self.owner = owner
         self.path = path
         self._lookups = lookups or {}
+        self._open(path)
+        self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
+        self._answered: dict[str, set[tuple[str, str]]] = {}
+        """Procedures and ids of the commands that were carried out, by session; read when first needed."""
+
+    def _open(self, path: Path) -> None:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self.mesh = mesh_id(path.parent)
@@ -113,9 +119,6 @@ class Journal:
                 else "set SHIFT_DATA to a folder for it"
             )
             raise InvalidSettings(f"the journal {path} cannot be opened: {e}; {what}") from e
-        self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
-        self._answered: dict[str, set[tuple[str, str]]] = {}
-        """Procedures and ids of the commands that were carried out, by session; read when first needed."""
 
     def _heads(self) -> dict[str, int]:
         """Return each session's last number. One look-up per session avoids reading all rows of a long study."""

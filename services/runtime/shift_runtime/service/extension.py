@@ -1,4 +1,4 @@
-"""What a service can add to the worker: a sink for the facts of others, and a protocol for ends in two halves."""
+"""The extension points of the worker: a sink for the facts of others, and a protocol for ends in two halves."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from shift_runtime.service.requests import PendingRequest
 
 
 class FactSink(Protocol):
-    """What a service does with the facts that it reads."""
+    """The processing of the facts that a service reads."""
 
     def apply(self, read: ReadFact) -> None:
         """Process one fact, or let the reader deliver it again later."""
 
 
 class EndProtocol(Protocol):
-    """How a command is carried out in two halves: the first is committed at once, and the second one replies."""
+    """A command in two halves: the first half is committed at once, and the second half replies."""
 
     def takes(self, request: PendingRequest) -> bool:
         """Return whether this request is a first half."""
@@ -53,7 +53,7 @@ async def _nothing() -> None:
 
 @dataclass(frozen=True)
 class Extension:
-    """What one service adds to the worker."""
+    """The parts that one service adds to the worker."""
 
     sink: FactSink
     ends: EndProtocol

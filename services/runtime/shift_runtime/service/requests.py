@@ -40,7 +40,7 @@ class PendingRequest:
 
     @property
     def key(self) -> AnswerKey | None:
-        """Under which its result is stored; None for a chunk, which has a number of its own."""
+        """The key of its stored result; None for a chunk, whose own number tells repeats."""
         if isinstance(self.message, Command):
             return (self.session, self.procedure, self.message.command_id)
         return None

@@ -1,4 +1,4 @@
-"""The transaction: what a service does is committed as a whole, or undone as a whole."""
+"""The transaction: the changes of a service are committed as a whole or undone as a whole."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class PendingReply:
 
 @dataclass
 class Transaction:
-    """What was done since the last commit, and who is told about it afterwards."""
+    """The changes since the last commit, and the replies that follow it."""
 
     batch: Batch = field(default_factory=Batch)
     before: dict[str, Any] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Transaction:
 
     @property
     def must_commit(self) -> bool:
-        """Whether somebody sees what was done. Cursors alone need no commit: reading again has no effect."""
+        """Whether a change is visible outside. Cursors alone need no commit: reading facts again has no effect."""
         batch = self.batch
         return bool(batch.rows or batch.answers or batch.closed) or any(not reply.repeat for reply in self.replies)
 
@@ -94,10 +94,10 @@ class Transactions(Generic[S]):
         self._timing = False
         self.open = Transaction()
 
-    # --- what a turn adds ---
+    # --- changes ---
 
     def apply_step(self, session: str, step: Step[S]) -> None:
-        """Add the next state of a session and the facts that follow from it."""
+        """Add the next state of a session and the facts to publish."""
         transaction = self.open
         transaction.before.setdefault(session, self._states.loaded(session))
         self._states.put(session, step.state)
@@ -137,7 +137,7 @@ class Transactions(Generic[S]):
         """Reply with an error after the commit."""
         self.open.refusals.append((request, error))
 
-    # --- what it shows before the commit ---
+    # --- reading, committed or not ---
 
     def head(self, session: str) -> int:
         """Return the number of the session's last fact, committed or not."""
@@ -160,10 +160,10 @@ class Transactions(Generic[S]):
     # --- the commit ---
 
     def commit(self) -> Transaction | None:
-        """Commit what was done if somebody sees it; return what may be told, or None where the disk refused.
+        """Commit the changes if they are visible; return the transaction to reply to, or None if the disk refused.
 
-        Input without visible effect is committed with the next visible one, or within :data:`COMMIT_WITHIN_S`. Where
-        the disk refuses, nothing of the transaction happened and every request in it is refused.
+        Input without visible effect is committed with the next visible change, or within :data:`COMMIT_WITHIN_S`. If
+        the disk refuses, the whole transaction is undone and every request in it is refused.
         """
         done = self.open
         if not done.must_commit and not (self._forced and done.batch.states):

@@ -18,7 +18,7 @@ NOTIFICATION_WAIT_S = 0.05
 
 
 class Puller(Protocol):
-    """What waiting needs of a reader."""
+    """The part of a reader that pulls."""
 
     @property
     def owners(self) -> tuple[str, ...]:
