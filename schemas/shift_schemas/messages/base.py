@@ -167,8 +167,8 @@ class Command(Message):
         "{procedure} {id} was asked before", "request", "Choose another id for another request"
     )
     """The words of its refusal, if its id was used before with another content."""
-    beside: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
-    """Fields that do not make it another command."""
+    not_content: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
+    """Fields that a repeat may have otherwise."""
 
     command_id: Id
     session: Id
@@ -178,7 +178,7 @@ class Command(Message):
 
     def content(self) -> str:
         """Return what a repeat must be equal in: everything but what the sender had read by then."""
-        return self.model_dump_json(exclude=set(self.beside))
+        return self.model_dump_json(exclude=set(self.not_content))
 
     @classmethod
     def body_fields(cls) -> tuple[str, ...]:

@@ -119,8 +119,8 @@ class ReportPerformance(Command):
 
     def content(self) -> str:
         """Return the content; a first report has no ``corrects``, as in version 0.1."""
-        beside = self.beside if self.corrects is not None else {*self.beside, "corrects"}
-        return self.model_dump_json(exclude=set(beside))
+        excluded = self.not_content if self.corrects is not None else {*self.not_content, "corrects"}
+        return self.model_dump_json(exclude=set(excluded))
 
     @property
     def decision_id(self) -> str:

@@ -89,7 +89,7 @@ class StartSession(Command):
     id_field = "session"
     wording = RepeatWording("session {session} is there already", "start", "Choose another session id")
     internal = frozenset({"replay_of", "software", "revision", "format", "warnings"})
-    beside = frozenset({"need", "command_id", "format", "warnings"})
+    not_content = frozenset({"need", "command_id", "format", "warnings"})
 
     participant: Id = Field(description="Pseudonym of the participant.")
     session: Id = Field(description="Left out: a new id.")
