@@ -19,31 +19,6 @@ NAMES = frozenset({"session", "procedure", "command_id"})
 """Fields that say which command it is. They are equal in both."""
 
 
-class _Wording(NamedTuple):
-    """The words for one kind of command. ``{id}`` is the command's id, ``{session}`` its session."""
-
-    first: str
-    again: str
-    remedy: str
-
-
-_WORDINGS: dict[str, _Wording] = {
-    "start_session": _Wording("session {session} is there already", "start", "Choose another session id"),
-    "end_session": _Wording("the end of session {session} was asked for before", "end", "Send it again unchanged"),
-    "configure": _Wording("change {id} was made before", "change", "Choose another id for another change"),
-    "mark": _Wording("marker {id} was set before", "marker", "Choose another marker_id for another marker"),
-    "decide": _Wording("decision {id} was made before", "request", "Choose another decision_id for another decision"),
-    "override": _Wording("override {id} was set before", "override", "Choose another override_id for another override"),
-    "report_performance": _Wording(
-        "decision {id} has its report already",
-        "report",
-        'To replace the first report, send this one with "corrects": true; for another decision, send that '
-        "decision's decision_id",
-    ),
-}
-_OTHER = _Wording("{procedure} {id} was asked before", "request", "Choose another id for another request")
-
-
 class Difference(NamedTuple):
     """One place where two contents differ. ``before`` and ``now`` are JSON values; None is a missing field."""
 
@@ -82,7 +57,7 @@ def repeat_conflict(command: Command, before: str) -> Conflict:
         The first command's content as JSON. If it is not known (a journal of version 0.1.0 has only a digest), the
         sentence names no values.
     """
-    words = _WORDINGS.get(command.procedure, _OTHER)
+    words = command.wording
     first = words.first.format(id=command.command_id, session=command.session, procedure=command.procedure)
     found = differences(before, command.content()) if before.startswith("{") else []
     if not found:

@@ -414,7 +414,7 @@ async def test_learner_on_triples_names_its_states_by_triples(mesh: Mesh) -> Non
     assert (await session.decide())["state"] == "high/focused/unknown"
 
 
-# --- what a door answered is in everything that it answers afterwards ---
+# --- later answers include everything that was answered before ---
 
 
 async def test_next_read_and_decision_include_every_write(mesh: Mesh) -> None:

@@ -184,17 +184,17 @@ QUIET = settings(deadline=None, max_examples=60, derandomize=True, suppress_heal
     st.dictionaries(st.sampled_from(FIELDS), values, max_size=4),
     st.booleans(),
 )
-async def test_no_json_body_causes_a_server_error(mesh: Mesh, door: str, change: dict[str, Any], bare: bool) -> None:
+async def test_no_json_body_causes_a_server_error(mesh: Mesh, tail: str, change: dict[str, Any], bare: bool) -> None:
     session = getattr(mesh, "fuzzed", None) or await mesh.session(STUDY)
     mesh.fuzzed = session  # type: ignore[attr-defined]
-    base = {} if bare else COMMANDS.get(door, {"participant": "P01"} if door == "start" else {})
+    base = {} if bare else COMMANDS.get(tail, {"participant": "P01"} if tail == "start" else {})
     text = json.dumps(base | change)
-    if door == "start":
+    if tail == "start":
         answer = await mesh.ask("POST", "/v1/sessions", content=text)
-    elif door == "config":
+    elif tail == "config":
         answer = await mesh.ask("PATCH", session.path("config"), content=text)
     else:
-        answer = await mesh.ask("POST", session.path(door), content=text)
+        answer = await mesh.ask("POST", session.path(tail), content=text)
     assert answer.status_code in (200, 201, 202, 404, 409, 422)
     if answer.status_code >= 400:
         problem(answer, answer.status_code)
@@ -202,11 +202,11 @@ async def test_no_json_body_causes_a_server_error(mesh: Mesh, door: str, change:
 
 @QUIET
 @given(st.binary(max_size=200), st.sampled_from([*COMMANDS, "config"]))
-async def test_no_bytes_cause_a_server_error(mesh: Mesh, body: bytes, door: str) -> None:
+async def test_no_bytes_cause_a_server_error(mesh: Mesh, body: bytes, tail: str) -> None:
     session = getattr(mesh, "fuzzed", None) or await mesh.session(STUDY)
     mesh.fuzzed = session  # type: ignore[attr-defined]
-    method = "PATCH" if door == "config" else "POST"
-    problem(await mesh.ask(method, session.path(door), content=body), 422)
+    method = "PATCH" if tail == "config" else "POST"
+    problem(await mesh.ask(method, session.path(tail), content=body), 422)
 
 
 # --- services that are not there ---
@@ -249,7 +249,7 @@ async def test_no_session_is_called_unknown_without_the_recorder(own_mesh: Mesh)
         problem(await own_mesh.ask("POST", f"/v1/sessions/nobody/{tail}", body), 503)
     problem(await own_mesh.ask("POST", "/v1/sessions", {"participant": "P01"}), 503)
     problem(await session.configure({"reward": {"scale": 2}}), 503)
-    assert (await session.decide())["n"] == 1, "what is known goes on"
+    assert (await session.decide())["n"] == 1, "a known session continues"
     assert [s["session"] for s in (await own_mesh.ask("GET", "/v1/sessions")).json()["sessions"]] == [session.name]
 
 
@@ -297,7 +297,7 @@ async def test_new_gateway_reads_the_journals(own_mesh: Mesh) -> None:
     before = {tail: await live.read(tail) for tail in ("", "observation", "policy", "config", "strategy?task=grasp")}
     policy = await over.read("policy")
     app = own_mesh.app
-    async with app.router.lifespan_context(app):  # the same paths over a replica that has read nothing yet
+    async with app.router.lifespan_context(app):  # the same paths over a read model that has read nothing yet
         for tail, shown in before.items():
             assert await live.read(tail) == shown
         assert (await over.read())["counts"] == ended["counts"]

@@ -258,7 +258,7 @@ async def test_ended_session_accepts_no_input_and_can_be_read(mesh: Mesh) -> Non
         assert "has ended" in answer.json()["detail"]
     assert (await session.configure({"reward": {"scale": 2}})).status_code == 409
     assert (await session.get("strategy?task=grasp")).status_code == 409
-    assert await session.decide(decision_id="d1") == decision, "a repeat gets the first result for ever"
+    assert await session.decide(decision_id="d1") == decision, "a repeat always gets the first result"
     assert await session.report("d1") == reported
     for tail, shown in before.items():
         assert await session.read(tail) == shown

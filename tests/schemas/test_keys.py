@@ -67,7 +67,7 @@ def test_hostile_sessions_are_neither_built_nor_parsed(session: str) -> None:
     for text in (f"shift/v1/{session}/gaze", f"shift/v1/{session}/in/gaze", f"shift/v1/{session}/rpc/decide"):
         with pytest.raises(MalformedMessage) as refused:
             parse_key(text)
-        assert len(refused.value.detail) < 400, "a long key is not said back"
+        assert len(refused.value.detail) < 400, "a long key is not repeated"
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def test_fields_that_the_declarations_name_exist() -> None:
         assert not fact.number or fact.number in fact.model_fields
     for command in COMMANDS.values():
         assert command.internal <= set(command.model_fields)
-        assert command.beside <= set(command.model_fields)
+        assert command.not_content <= set(command.model_fields)
         assert command.result is None or command.result.owner == command.owner
 
 

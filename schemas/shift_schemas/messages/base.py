@@ -124,6 +124,19 @@ class RestRoute(NamedTuple):
     """The content types of the body in the documentation; empty: the path needs no body and ignores one."""
 
 
+class RepeatWording(NamedTuple):
+    """The words for a command whose id was used before with another content (:mod:`shift_schemas.conflicts`).
+
+    ``{id}`` is the command's id, ``{session}`` its session, ``{procedure}`` its procedure.
+    """
+
+    first: str
+    """What the first command did."""
+    again: str
+    """What the command is called."""
+    remedy: str
+
+
 class Command(Message):
     """A request to the owner of a fact. ``command_id`` names it: a repeat gets the first result."""
 
@@ -150,8 +163,12 @@ class Command(Message):
     """Fields that the body does not have: the services fill them in."""
     body: ClassVar[type[BaseModel] | None] = None
     """The model of the body, if it cannot be derived from the fields (:mod:`shift_schemas.requests`)."""
-    beside: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
-    """Fields that do not make it another command."""
+    wording: ClassVar[RepeatWording] = RepeatWording(
+        "{procedure} {id} was asked before", "request", "Choose another id for another request"
+    )
+    """The words of its refusal, if its id was used before with another content."""
+    not_content: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
+    """Fields that a repeat may have otherwise."""
 
     command_id: Id
     session: Id
@@ -161,7 +178,7 @@ class Command(Message):
 
     def content(self) -> str:
         """Return what a repeat must be equal in: everything but what the sender had read by then."""
-        return self.model_dump_json(exclude=set(self.beside))
+        return self.model_dump_json(exclude=set(self.not_content))
 
     @classmethod
     def body_fields(cls) -> tuple[str, ...]:

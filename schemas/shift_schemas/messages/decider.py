@@ -6,7 +6,7 @@ from pydantic import Field
 from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass, PolicySource
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Seen, Strategy, Text
+from shift_schemas.messages.base import Command, Count, Fact, Message, RepeatWording, RestRoute, Seen, Strategy, Text
 
 
 class TripleView(Message):
@@ -93,6 +93,9 @@ class Decide(Command):
     route = RestRoute("POST", "/v1/sessions/{session}/decisions")
     id_field = "decision_id"
     id_prefix = "d-"
+    wording = RepeatWording(
+        "decision {id} was made before", "request", "Choose another decision_id for another decision"
+    )
 
     task: Id = Field(description="The task that is to be explained.")
 
@@ -107,6 +110,9 @@ class SetOverride(Command):
     route = RestRoute("POST", "/v1/sessions/{session}/override")
     id_field = "override_id"
     id_prefix = "o-"
+    wording = RepeatWording(
+        "override {id} was set before", "override", "Choose another override_id for another override"
+    )
 
     task: Id
     strategy: Strategy = Field(description="One level of each of the study's strategies.")

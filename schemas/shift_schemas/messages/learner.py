@@ -8,7 +8,7 @@ from pydantic import Field
 from shift_model.vocabulary import LearnerName
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, RestRoute, Strategy, Warnings
+from shift_schemas.messages.base import Command, Count, Fact, Message, RepeatWording, RestRoute, Strategy, Warnings
 from shift_schemas.messages.decider import Versions
 
 
@@ -106,6 +106,12 @@ class ReportPerformance(Command):
     route = RestRoute("POST", "/v1/sessions/{session}/performance")
     id_field = "decision_id"
     body = PerformanceBody
+    wording = RepeatWording(
+        "decision {id} has its report already",
+        "report",
+        'To replace the first report, send this one with "corrects": true; for another decision, send that '
+        "decision's decision_id",
+    )
 
     comprehension: Result
     enabledness: Result
@@ -113,8 +119,8 @@ class ReportPerformance(Command):
 
     def content(self) -> str:
         """Return the content; a first report has no ``corrects``, as in version 0.1."""
-        beside = self.beside if self.corrects is not None else {*self.beside, "corrects"}
-        return self.model_dump_json(exclude=set(beside))
+        excluded = self.not_content if self.corrects is not None else {*self.not_content, "corrects"}
+        return self.model_dump_json(exclude=set(excluded))
 
     @property
     def decision_id(self) -> str:

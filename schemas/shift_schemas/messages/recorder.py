@@ -12,6 +12,7 @@ from shift_schemas.messages.base import (
     Count,
     Fact,
     JsonObject,
+    RepeatWording,
     RestRoute,
     SessionEvent,
     SessionState,
@@ -86,8 +87,9 @@ class StartSession(Command):
     route = RestRoute("POST", "/v1/sessions", tag="sessions")
     fixed_id = START_ID
     id_field = "session"
+    wording = RepeatWording("session {session} is there already", "start", "Choose another session id")
     internal = frozenset({"replay_of", "software", "revision", "format", "warnings"})
-    beside = frozenset({"need", "command_id", "format", "warnings"})
+    not_content = frozenset({"need", "command_id", "format", "warnings"})
 
     participant: Id = Field(description="Pseudonym of the participant.")
     session: Id = Field(description="Left out: a new id.")
@@ -110,6 +112,7 @@ class EndSession(Command):
     wait_s = 10.0
     route = RestRoute("POST", "/v1/sessions/{session}/end", 200, "sessions", media_types=())
     fixed_id = END_ID
+    wording = RepeatWording("the end of session {session} was asked for before", "end", "Send it again unchanged")
 
 
 class PatchBody(RootModel[JsonObject]):
@@ -127,6 +130,7 @@ class Configure(Command):
         ("application/merge-patch+json", "application/json"),
     )  # fmt: skip
     body = PatchBody
+    wording = RepeatWording("change {id} was made before", "change", "Choose another id for another change")
 
     patch: JsonObject
 
@@ -145,5 +149,6 @@ class Mark(Command):
     route = RestRoute("POST", "/v1/sessions/{session}/markers")
     id_field = "marker_id"
     id_prefix = "m-"
+    wording = RepeatWording("marker {id} was set before", "marker", "Choose another marker_id for another marker")
 
     text: Text

@@ -43,7 +43,7 @@ class GatewayApi(MeshApi):
     async def sessions(self) -> list[dict[str, Any]]:
         """Return every session."""
         if not await self.read_model.reader.pull("recorder") and "recorder" in self.read_model.missing:
-            raise Unavailable("the recorder does not answer, so nobody knows which sessions there are")
+            raise Unavailable("the recorder does not answer, so it is not known which sessions exist")
         live = [view for view in self.read_model.views.values() if not has_ended(view.fact.state)]
         await asyncio.gather(*(self._read(view, tuple(view.sequences)) for view in live))
         return [session_body(view) for view in self.read_model.views.values()]

@@ -106,7 +106,9 @@ class MeshApi:
     async def _check_decision(self, session: str, view: SessionView, decision_id: str) -> None:
         if decision_id not in view.decisions:
             if not await self.read_model.reader.pull("decider"):
-                raise Unavailable("the decider does not answer, so nobody knows whether there is such a decision")
+                raise Unavailable(
+                    f"the decider does not answer, so it is not known whether decision {decision_id} exists"
+                )
             if decision_id not in view.decisions:
                 raise UnknownThing(f"session {session} has no decision {decision_id}")
 

@@ -106,7 +106,7 @@ class ReadModel:
             await self.reader.pull_all(self.missing)
         if session not in self.views:
             if not await self.reader.pull("recorder"):
-                raise Unavailable("the recorder does not answer, so nobody knows whether there is such a session")
+                raise Unavailable(f"the recorder does not answer, so it is not known whether session {session} exists")
             if session not in self.views:
                 raise UnknownThing(f"there is no session {session}")
         return self.views[session]
