@@ -26,7 +26,7 @@ POLL_S = 0.1
 GRACE_S = 12.0
 """How long a service may take to stop; the recorder finishes files in it."""
 STEADY_S = 3.0
-"""After so long a life, the next death is a first one again; who cannot even start does not get there."""
+"""A process that ran this many seconds has its back-off reset."""
 LONGEST_PAUSE_S = 2.0
 """Before the next try; with the start itself below the 5 s of RELIABILITY.md, row 3."""
 SETTINGS_WRONG = 2

@@ -1,4 +1,4 @@
-"""``--ros-args``: remaps, parameters and parameter files as ROS nodes take them. Pure, but for the files' text.
+"""``--ros-args``: remaps, parameters and parameter files as ROS nodes take them. Pure; it only reads the files.
 
 ``--ros-args -r old:=new -p name:=value -r __ns:=/lab -r __node:=shift --params-file FILE --log-level LEVEL``,
 ended by ``--`` or the end of the line.
@@ -30,7 +30,7 @@ _IGNORED_WITH_VALUE = {"-e", "--enclave", "--log-config-file"}
 
 @dataclass
 class RosArguments:
-    """What the line says. ``rest`` is what was not ROS's."""
+    """The parts of a command line. ``rest`` has the words that are not for ROS."""
 
     node: str | None = None
     namespace: str | None = None
@@ -42,7 +42,7 @@ class RosArguments:
 
 
 def parse_ros_args(line: Sequence[str]) -> RosArguments:
-    """Take a command line apart. Raises :class:`InvalidSettings` that names the word at fault."""
+    """Return the parts of a command line. Raise :class:`InvalidSettings`, which names the wrong word."""
     found = RosArguments()
     words = list(line)
     inside = False
@@ -73,7 +73,7 @@ def parse_ros_args(line: Sequence[str]) -> RosArguments:
 
 
 def parameters_of(text: str, file: str, full_name: str, known: Callable[[str], bool]) -> Parameters:
-    """The parameters for the node ``full_name`` in a parameter file.
+    """Return the parameters for the node ``full_name`` in a parameter file.
 
     A section for every node (``/**``) may have parameters of others; one for this node may not.
     """
@@ -105,7 +105,7 @@ def _composed(text: str) -> Node | None:
 
 
 def _as_written(node: Node | None, depth: int) -> Any:
-    """The node's data, each value as it is written: a session ``010`` or ``no`` is a name, which the settings read."""
+    """Return the node's data with each value as written: a session ``010`` or ``no`` is a name."""
     if node is None or depth > DEEPEST:
         return None
     if isinstance(node, ScalarNode):
@@ -159,7 +159,7 @@ def _remap(found: RosArguments, text: str) -> None:
 
 
 def _scalar(name: str, value: Any) -> str:
-    """The value as text, for the settings to read; quotes as in YAML."""
+    """Return the value as text for the settings, with quotes read as in YAML."""
     if isinstance(value, str) and value[:1] in ("'", '"'):
         try:
             value = _as_written(_composed(value), 0)

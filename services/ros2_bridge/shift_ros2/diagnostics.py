@@ -1,4 +1,4 @@
-"""What came, what was dropped and why, as ``/shift/diagnostics`` tells it. Pure; time is passed in.
+"""The counts and reasons that ``/shift/diagnostics`` publishes. Pure: the caller passes the time.
 
 A text at most every ``interval_s``, and only where there is news: a million bad messages are one number.
 """
@@ -13,12 +13,12 @@ from typing import Any
 from shift_schemas.errors import ShiftError, shorten
 
 TOPICS = 32
-"""So many topics are counted by name; nobody fills memory with names of his own."""
+"""Count at most this many topics separately, which bounds memory."""
 
 
 @dataclass
 class Diagnostics:
-    """Counts since the start."""
+    """Counts of received and dropped messages since the start."""
 
     interval_s: float
     received: Counter[str] = field(default_factory=Counter)
@@ -29,11 +29,11 @@ class Diagnostics:
     _due_s: float = 0.0
 
     def came(self, topic: str, count: int = 1) -> None:
-        """Something arrived; no news in itself."""
+        """Count a received message; it alone causes no report."""
         self.received[topic] += count
 
     def lost(self, topic: str, error: ShiftError, count: int = 1, reason: str = "") -> None:
-        """Something was dropped or refused."""
+        """Count dropped or refused messages; the next report has the last reason."""
         key = (topic, reason or error.kind)
         if key not in self.dropped and len(self.dropped) >= TOPICS:
             key = ("other", "other")
@@ -45,12 +45,12 @@ class Diagnostics:
         self._news = True
 
     def now(self, state: str) -> None:
-        """What the bridge is doing; ``ready``, or what it waits for."""
+        """Set the state of the bridge: ``ready``, or what it waits for."""
         self._news = self._news or state != self.state
         self.state = state
 
     def report(self, now_s: float, **more: Any) -> str | None:
-        """The text to publish, if there is news and it is time."""
+        """Return the text to publish, or None if nothing changed or it is too early."""
         if not self._news or now_s < self._due_s:
             return None
         self._news = False
@@ -63,5 +63,5 @@ class Diagnostics:
 
 
 def shorten_detail(detail: str) -> str:
-    """A sentence at its whole; a novel not."""
+    """Truncate the detail above 500 characters."""
     return detail if len(detail) <= 500 else shorten(detail)

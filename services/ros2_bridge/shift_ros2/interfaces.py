@@ -1,4 +1,4 @@
-"""What the node has: topics and services by their default names. A table; both backends declare from it. Pure."""
+"""The table of topics and services of the node, by their default names. Both backends declare it. Pure."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Topic = Literal[
 
 @dataclass(frozen=True)
 class Interface:
-    """One topic or service. ``stream``: it takes the gaze stream's QoS."""
+    """One topic or service. ``stream`` says that it has the QoS of the gaze stream."""
 
     topic: Topic
     direction: Direction
@@ -24,7 +24,7 @@ class Interface:
 
     @property
     def name(self) -> str:
-        """Its name within the namespace, before remapping."""
+        """The name within the namespace, before remapping."""
         return f"shift/{self.topic}"
 
 
@@ -39,4 +39,4 @@ INTERFACES: tuple[Interface, ...] = (
     Interface("diagnostics", "out"),
 )
 PUBLISHED: frozenset[str] = frozenset({"observation", "estimate", "decision"})
-"""Facts of the mesh that are put out as topics."""
+"""Facts of the mesh that are published as topics."""

@@ -1,4 +1,4 @@
-"""ROS names: what a name, namespace or node may be called, relative names, remap rules. Pure."""
+"""ROS names: rules for names, namespaces and nodes, relative names, and remap rules. Pure."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ LONGEST_NAME = 255
 
 @dataclass(frozen=True)
 class Remap:
-    """``old:=new``."""
+    """One remap rule, ``old:=new``."""
 
     old: str
     new: str
 
 
 def check_node(name: str) -> str:
-    """``name``, or :class:`InvalidSettings` that says what a node may be called."""
+    """Return ``name``. Raise :class:`InvalidSettings` if it is not valid for a node."""
     if len(name) > LONGEST_NAME or not _NODE.fullmatch(name):
         raise InvalidSettings(f"node {shorten(name)!r}: {NAME_RULE}, without /")
     return name
 
 
 def check_namespace(namespace: str) -> str:
-    """``namespace`` with its leading slash, or :class:`InvalidSettings`."""
+    """Return ``namespace`` with its leading slash. Raise :class:`InvalidSettings` if it is not valid."""
     full = namespace if namespace.startswith("/") else f"/{namespace}"
     if len(full) > LONGEST_NAME or not _NAMESPACE.fullmatch(full):
         raise InvalidSettings(f"namespace {shorten(namespace)!r}: {NAME_RULE}")
@@ -40,9 +40,9 @@ def check_namespace(namespace: str) -> str:
 
 
 def expanded(name: str, namespace: str, node: str) -> str:
-    """The full name: ``gaze`` is in the namespace, ``~/gaze`` under the node, ``/gaze`` as it is.
+    """Return the full name: ``gaze`` is in the namespace, ``~/gaze`` below the node, ``/gaze`` is unchanged.
 
-    Raises :class:`InvalidSettings` for what is no ROS name; wildcards are none.
+    Raises :class:`InvalidSettings` for a name that ROS does not allow; wildcards are not allowed.
     """
     if len(name) > LONGEST_NAME or not _NAME.fullmatch(name):
         raise InvalidSettings(f"name {shorten(name)!r}: {NAME_RULE}")
@@ -55,7 +55,7 @@ def expanded(name: str, namespace: str, node: str) -> str:
 
 
 def resolved(name: str, namespace: str, node: str, remaps: Iterable[Remap]) -> str:
-    """The full name after the first remap rule that fits."""
+    """Return the full name after the first remap rule that matches."""
     full = expanded(name, namespace, node)
     for rule in remaps:
         if expanded(rule.old, namespace, node) == full:

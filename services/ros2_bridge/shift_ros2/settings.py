@@ -1,4 +1,4 @@
-"""Settings of the bridge: ``--ros-args -p`` and flags, else a parameter file, else environment, else default."""
+"""Settings of the bridge: ``--ros-args -p`` and flags, then a parameter file, the environment, the default."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Reliability = Literal["best_effort", "reliable"]
 
 
 class BridgeSettings(MeshSettings):
-    """What the bridge needs to know. Each name is a ROS parameter, and ``SHIFT_NAME`` in the environment."""
+    """The settings of the bridge. Each name is a ROS parameter, and ``SHIFT_NAME`` in the environment."""
 
     backend: Literal["native", "rclpy"] = Field(default="native", description="How it speaks to ROS.")
     ros_router: str = Field(default=DEFAULT_ROS_ROUTER, description="native: the Zenoh router that ROS nodes meet at.")
@@ -56,7 +56,7 @@ class BridgeSettings(MeshSettings):
 
     @property
     def bound_session(self) -> str:
-        """The session that messages without one belong to. Raises :class:`InvalidSettings`."""
+        """The session of messages that name none. Raises :class:`InvalidSettings`."""
         if self.session is not None:
             return self.session
         named = self.namespace.rpartition("/")[2] or DEFAULT_SESSION
@@ -67,20 +67,20 @@ class BridgeSettings(MeshSettings):
 
     @property
     def names(self) -> dict[str, str]:
-        """Full ROS name of each interface."""
+        """The full ROS name of each interface."""
         rules = [Remap(old, new) for old, new in self.remaps]
         return {i.topic: resolved(i.name, self.namespace, self.node, rules) for i in INTERFACES}
 
 
 PARAMETERS: frozenset[str] = frozenset(BridgeSettings.model_fields) - {"remaps", "node", "namespace"}
-"""What ``-p`` and parameter files can set; node and namespace are remapped as in ROS."""
+"""The parameters that ``-p`` and parameter files can set; node and namespace are set by remapping, as in ROS."""
 _FLAGS = {
     "--backend": "backend", "--session": "session", "--zenoh": "zenoh", "--ros-router": "ros_router", "--data": "data",
 }  # fmt: skip
 
 
 def bridge_settings(line: Sequence[str]) -> BridgeSettings:
-    """The settings of a command line and the environment.
+    """Return the settings of a command line and the environment.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def bridge_settings(line: Sequence[str]) -> BridgeSettings:
 
 
 def _ros_environment() -> Parameters:
-    """What every ROS node takes from the environment, where nothing of ours says otherwise."""
+    """Return the settings that every ROS node takes from the environment; settings of the bridge override them."""
     variables = {"domain": ("SHIFT_DOMAIN", "ROS_DOMAIN_ID"), "distribution": ("SHIFT_DISTRIBUTION", "ROS_DISTRO")}
     return {
         name: os.environ[theirs]

@@ -88,5 +88,5 @@ class DeciderSettings(StudyPart):
     """How a decision comes about."""
 
     wait_s: Annotated[float, Field(ge=0, le=300)] = Field(
-        default=2.0, description="How long a decision waits for what it must have seen, s; 0 never waits."
+        default=2.0, description="How long a decision waits until your earlier data is processed, s; 0 never waits."
     )

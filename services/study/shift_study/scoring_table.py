@@ -168,7 +168,7 @@ class ScoringSettings(StudyPart):
 
     @cached_property
     def actions(self) -> tuple[tuple[str, ...], ...]:
-        """Every action, as levels in the strategies' order, the last strategy fastest."""
+        """Every combination of levels in the order of the strategies; the last strategy varies first."""
         return tuple(product(*(s.levels for s in self.strategies.values())))
 
     @cached_property
