@@ -13,6 +13,7 @@ import numpy as np
 from shift_learner.learner import Context, Learner, Taken
 from shift_learner.learners import learner_named
 from shift_learner.learners.planning import engine
+from shift_model.q_learning import decayed_epsilon, updated_value
 from shift_model.random_numbers import pick
 
 from shift_simulator.random_streams import Bools, Floats, Ints
@@ -86,7 +87,7 @@ class BatchQLearning:
         """Learn what waits for this state, then draw from epsilon-greedy over the actions never taken."""
         state = self._suggested[triple]
         values = self._updated(state)
-        epsilon = self._study.learner.epsilon * max(0.0, 1.0 - self._decisions / self._study.interactions)
+        epsilon = decayed_epsilon(self._study.learner.epsilon, self._decisions, self._study.interactions)
         candidates: Bools = ~self._taken | self._taken.all(axis=1, keepdims=True)
         share = epsilon / candidates.sum(axis=1)
         row = np.where(candidates, share[:, None], 0.0)
@@ -101,12 +102,16 @@ class BatchQLearning:
         self._pending = self._suggested[triple], action, reward
 
     def _updated(self, following: Ints) -> Floats:
-        """Q(s, a) moves towards r + gamma x max Q(s'); gives the rows of the following states."""
+        """Apply the pending update; return the rows of the following states."""
         if self._pending is not None:
             state, action, reward = self._pending
-            target = reward + self._discount * self._values[self._runs, following].max(axis=1)
-            before = self._values[self._runs, state, action]
-            self._values[self._runs, state, action] = before + self._rate * (target - before)
+            self._values[self._runs, state, action] = updated_value(
+                self._values[self._runs, state, action],
+                reward,
+                self._values[self._runs, following].max(axis=1),
+                learning_rate=self._rate,
+                discount=self._discount,
+            )
         rows: Floats = self._values[self._runs, following]
         return rows
 
