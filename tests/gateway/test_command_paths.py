@@ -26,7 +26,8 @@ from support.gateway_mesh import Mesh
 
 pytestmark = pytest.mark.anyio
 numbers = itertools.count()
-names = st.text(string.ascii_lowercase, max_size=12).map(lambda name: f"{name}_{next(numbers)}")
+names = st.text(string.ascii_lowercase, max_size=12).map(lambda name: f"{name}_path_{next(numbers)}")
+"""Each name is used once in the test run: a declared class lives until it is collected."""
 
 
 def declared(name: str, owner: str, method: str, status: int) -> type[Command]:

@@ -27,8 +27,8 @@ from shift_schemas.registry import (
 )
 
 numbers = itertools.count()
-names = st.text(string.ascii_lowercase, max_size=12).map(lambda name: f"{name}_{next(numbers)}")
-"""Each name is new: a declared class lives on until it is collected."""
+names = st.text(string.ascii_lowercase, max_size=12).map(lambda name: f"{name}_table_{next(numbers)}")
+"""Each name is used once in the test run: a declared class lives until it is collected."""
 
 
 def test_each_fact_and_each_command_has_exactly_one_owner() -> None:
