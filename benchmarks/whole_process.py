@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import signal
 import statistics
 import subprocess
 import sys
@@ -18,63 +17,41 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from socket import socket
 
 import httpx
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from support.whole_mesh import running_mesh
+
 REQUESTS = 60
 RECORDING = Path(__file__).resolve().parents[1] / "tests" / "data" / "v0.1" / "configured.mcap"
-COMMAND = (sys.executable, "-c", "from shift_cli.main import main; main()")
 
 
-def environment(checkout: Path, **more: str) -> dict[str, str]:
+def environment(checkout: Path) -> dict[str, str]:
     """Return the environment in which Python imports the packages of ``checkout``."""
     packages = [str(path.parent.parent.resolve()) for path in checkout.glob("s*/**/shift_*/__init__.py")]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(packages), **more}
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(packages)}
 
 
 def command_s(checkout: Path, *words: str) -> float:
     """Return the seconds that a command of the command line takes."""
     begun = time.perf_counter()
-    subprocess.run([*COMMAND, *words], env=environment(checkout), check=True, capture_output=True)
+    subprocess.run(
+        [sys.executable, "-m", "shift_cli.main", *words], env=environment(checkout), check=True, capture_output=True
+    )
     return time.perf_counter() - begun
 
 
 def mesh_figures(checkout: Path, folder: Path) -> dict[str, float]:
     """Start a mesh; return the seconds until it is ready, and the median seconds of a decision and of a gaze chunk."""
-    with socket() as probe, socket() as other:
-        probe.bind(("127.0.0.1", 0))
-        other.bind(("127.0.0.1", 0))
-        port, zenoh = probe.getsockname()[1], f"tcp/127.0.0.1:{other.getsockname()[1]}"
-    words = ("up", "--port", str(port), "--data", str(folder), "--zenoh", zenoh)
     begun = time.perf_counter()
-    log = (folder / "mesh.log").open("wb")
-    mesh = subprocess.Popen([*COMMAND, *words], env=environment(checkout), stdout=log, stderr=log)
-    try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=30.0) as client:
-            wait_ready(client)
-            ready = time.perf_counter() - begun
+    with running_mesh(folder, environment=environment(checkout)) as mesh:
+        ready = time.perf_counter() - begun
+        with httpx.Client(base_url=mesh.url, timeout=30.0) as client:
             return {"up to ready": ready, **request_figures(client)}
-    finally:
-        mesh.send_signal(signal.SIGTERM)
-        mesh.wait(60)
-        log.close()
-
-
-def wait_ready(client: httpx.Client) -> None:
-    """Wait until ``/readyz`` says that the mesh is ready, for a minute at most."""
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline:
-        try:
-            if client.get("/readyz").json()["ready"]:
-                return
-        except httpx.TransportError:
-            pass
-        time.sleep(0.02)
-    raise SystemExit("the mesh is not ready after 60 s; see mesh.log in its folder")
 
 
 def request_figures(client: httpx.Client) -> dict[str, float]:

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from shift_model.vocabulary import LearnerName
 from shift_schemas.errors import InvalidStudy
-from shift_study.checks import PLAUSIBLE, study_mistakes, study_warnings
+from shift_study.area_checks import area_mistakes
+from shift_study.checks import PLAUSIBLE, study_warnings
 from shift_study.learner_settings import LEARNER_SETTINGS, LearnerSettings, parameters_of
 from shift_study.loading import parse_study, study_data, study_of
 from shift_study.study import Study
@@ -27,7 +28,7 @@ def refusal(text: str) -> str:
 
 def test_the_defaults_and_the_paper_s_values_are_beyond_doubt() -> None:
     assert study_warnings(Study(study="x")) == ()
-    assert study_mistakes(Study(study="x")) == ()
+    assert area_mistakes(Study(study="x").aois) == ()
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from shift_schemas.messages import Answer, Command, EndSession, OutboxPage, Outb
 from shift_schemas.registry import READS
 
 from support.runtime_fixtures import until
-from support.worker_rig import FullDisk
+from support.worker_rig import FullDisk, RunningWorker
 
 END = EndSession(command_id="end", session="s1")
 
@@ -47,7 +47,7 @@ class Peer:
 
 
 @dataclass
-class RecorderRig:
+class RecorderRig(RunningWorker):
     """A recorder with a data folder of its own."""
 
     data: Path
@@ -67,20 +67,6 @@ class RecorderRig:
             CORE, self.own_bus, self.journal, ManualClock(5), self.metrics, partial(extend, settings=settings)
         )
         self.running = asyncio.create_task(self.worker.run())
-
-    async def crash(self) -> None:
-        """End it at once, without :meth:`stop`'s tidying."""
-        self.running.cancel()
-        await asyncio.gather(self.running, return_exceptions=True)
-        self.worker.tasks.cancel()
-        await self.own_bus.close()
-        self.journal.close()
-
-    async def stop(self) -> None:
-        self.worker.stop()
-        await self.running
-        await self.own_bus.close()
-        self.journal.close()
 
     async def send(self, command: Command) -> Answer:
         """Return the answer, or raise the refusal."""

@@ -108,6 +108,7 @@ def running_mesh(
     port: int | None = None,
     zenoh: str | None = None,
     program: tuple[str, ...] = ("-m", "shift_cli.main"),
+    environment: dict[str, str] | None = None,
 ) -> Iterator[LiveMesh]:
     """``shift-mesh up`` until left; stopped, and its log shown where something went wrong."""
     port = port or free_port()
@@ -117,7 +118,11 @@ def running_mesh(
     folder.mkdir(parents=True, exist_ok=True)
     with open(log, "ab") as output:
         process = subprocess.Popen(
-            [*command, "--data", str(folder / "data"), *flags], stdout=output, stderr=output, cwd=folder
+            [*command, "--data", str(folder / "data"), *flags],
+            stdout=output,
+            stderr=output,
+            cwd=folder,
+            env=environment,
         )
     mesh = LiveMesh(process, port, zenoh, folder / "data", log)
     try:

@@ -137,8 +137,31 @@ class FullDisk(Journal):
         super().check()
 
 
+class RunningWorker:
+    """A worker that a test started, with its bus and its journal."""
+
+    worker: Worker[Any]
+    running: asyncio.Task[None]
+    own_bus: MemoryBus
+    journal: Journal
+
+    async def crash(self) -> None:
+        """End the worker at once; what was not committed is lost."""
+        self.running.cancel()
+        await asyncio.gather(self.running, return_exceptions=True)
+        self.worker.tasks.cancel()
+        await self.own_bus.close()
+        self.journal.close()
+
+    async def stop(self) -> None:
+        self.worker.stop()
+        await self.running
+        await self.own_bus.close()
+        self.journal.close()
+
+
 @dataclass
-class Rig:
+class Rig(RunningWorker):
     """A worker under test, with its owners and the test's own bus."""
 
     path: Path
@@ -158,20 +181,6 @@ class Rig:
         self.worker = Worker(CORE, self.own_bus, self.journal, ManualClock(5), Metrics("decider"))
         self.running = asyncio.create_task(self.worker.run())
         return self.worker
-
-    async def crash(self) -> None:
-        """End the worker at once; what was not committed is lost."""
-        self.running.cancel()
-        await asyncio.gather(self.running, return_exceptions=True)
-        self.worker.tasks.cancel()
-        await self.own_bus.close()
-        self.journal.close()
-
-    async def stop(self) -> None:
-        self.worker.stop()
-        await self.running
-        await self.own_bus.close()
-        self.journal.close()
 
     async def decide(
         self, command_id: str, task: str = "any", need: Seen | None = None, timeout_s: float = 5.0, name: str = "s1"

@@ -16,33 +16,15 @@ from shift_schemas.ids import Id
 from shift_schemas.timestamps import Stamp
 
 Strategy = dict[str, str]
-
-
 Count = Annotated[int, Field(ge=0, le=2**53)]
-
-
 SessionState = Literal["live", "ending", "ended"]
-
-
 SessionEvent = Literal["input", "end", "finish"]
 """What a command means for the lifecycle of its session: see :mod:`shift_schemas.lifecycle`."""
-
-
 GazeOutcome = Literal["applied", "late"]
-
-
 Seconds = Annotated[float, Field(ge=-1e11, le=1e11)]
-
-
 Text = Annotated[str, Field(max_length=10_000)]
-
-
 MOST_WARNINGS = 100
-
-
 Warnings = Annotated[list[str], Field(max_length=MOST_WARNINGS)]
-
-
 DEEPEST = 32
 """The deepest nesting of a plain JSON object within a message; a study has 6 levels."""
 

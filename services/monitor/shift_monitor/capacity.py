@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from shift_model.capacity import next_capacity, strategy_cost
 from shift_schemas.messages import Strategy
 from shift_study.constants import CapacitySettings
 
@@ -23,13 +22,5 @@ class Capacity:
 
 def apply_strategy(capacity: Capacity, strategy: Strategy, settings: CapacitySettings) -> Capacity:
     """Return the capacity after one executed strategy; it repeats the one before if all levels are equal."""
-    cost = strategy_cost(strategy.values(), settings.demanding, settings.demanding_cost, settings.other_cost)
-    value = next_capacity(
-        capacity.value,
-        strategy == capacity.strategy,
-        cost,
-        recovery=settings.recovery,
-        minimum=settings.min,
-        maximum=settings.max,
-    )
-    return Capacity(value, strategy)
+    repeated = strategy == capacity.strategy
+    return Capacity(settings.after(capacity.value, repeated, settings.cost_of(strategy.values())), strategy)

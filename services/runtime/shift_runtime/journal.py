@@ -20,7 +20,7 @@ from shift_schemas.errors import InvalidSettings, Unavailable
 from shift_schemas.messages import OutboxPage, OutboxQuery, OutboxRow
 
 from shift_runtime.claim import mesh_id
-from shift_runtime.journal_schema import migrate, schema_version
+from shift_runtime.journal_schema import migrate, schema_version, transaction
 
 LOG_PAGES, PAGE_BYTES = 1000, 4096
 """SQLite's defaults: after so many pages in the log, a checkpoint runs and the log is overwritten from its start."""
@@ -253,12 +253,9 @@ class Journal:
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         try:
-            self._db.execute("BEGIN IMMEDIATE")
-            yield
-            self._db.execute("COMMIT")
+            with transaction(self._db):
+                yield
         except sqlite3.Error as e:
-            if self._db.in_transaction:
-                self._db.execute("ROLLBACK")
             raise Unavailable(f"the {self.owner} cannot write its journal {self.path.name}: {e}") from e
 
     def _write(self, batch: Batch) -> None:

@@ -79,7 +79,7 @@ def migrate(db: sqlite3.Connection, path: Path, migrations: tuple[Migration, ...
     _check_version(db, path, len(migrations))
     if schema_version(db) == len(migrations):
         return
-    with _transaction(db):
+    with transaction(db):
         for migration in migrations[schema_version(db) :]:
             migration(db)
         db.execute(f"PRAGMA application_id = {APPLICATION_ID}")
@@ -115,7 +115,8 @@ def _check_version(db: sqlite3.Connection, path: Path, known: int) -> None:
 
 
 @contextmanager
-def _transaction(db: sqlite3.Connection) -> Iterator[None]:
+def transaction(db: sqlite3.Connection) -> Iterator[None]:
+    """Commit what the block writes, or nothing of it if it raises."""
     db.execute("BEGIN IMMEDIATE")
     try:
         yield

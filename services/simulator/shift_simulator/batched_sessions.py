@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from shift_model.capacity import is_high, next_capacity, strategy_cost
+from shift_model.capacity import is_high
 from shift_model.reward import reward as reward_of
 from shift_model.reward import task_performance
 from shift_model.vocabulary import AWARENESSES, GAZES
@@ -125,18 +125,13 @@ class Capacities:
 
     def execute(self, action: Ints) -> None:
         """Update each run by the capacity equation after its action (an index)."""
-        s = self._settings
-        self._value = next_capacity(
-            self._value, action == self._previous, self._cost[action],
-            recovery=s.recovery, minimum=s.min, maximum=s.max,
-        )  # fmt: skip
+        self._value = self._settings.after(self._value, action == self._previous, self._cost[action])
         self._previous = action
 
 
 def action_costs(settings: CapacitySettings, study: Study) -> Floats:
     """Return the capacity that each action costs, float [actions]."""
-    s = settings
-    return np.array([strategy_cost(a, s.demanding, s.demanding_cost, s.other_cost) for a in study.scoring.actions])
+    return np.array([settings.cost_of(levels) for levels in study.scoring.actions])
 
 
 def gaze_classes(draws: Draws, keep: float) -> Ints:

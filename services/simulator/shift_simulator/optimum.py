@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from shift_model.capacity import is_high, next_capacity
+from shift_model.capacity import is_high
 from shift_model.vocabulary import AWARENESSES, GAZES
 from shift_schemas.errors import InvalidSettings
 from shift_study.study import Study
@@ -118,9 +118,7 @@ def _capacity_graph(user: User, study: Study) -> CapacityGraph:
         row = []
         for action in range(ACTIONS):
             values = [
-                next_capacity(
-                    v, action == previous, float(c[action]), recovery=s.recovery, minimum=s.min, maximum=s.max
-                )
+                s.after(v, action == previous, float(c[action]))
                 for v, s, c in zip((shown, true), both, cost, strict=True)
             ]
             key = (round(values[0], 9), round(values[1], 9), action)

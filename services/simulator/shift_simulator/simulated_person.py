@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-from shift_model.capacity import capacity_class, next_capacity
+from shift_model.capacity import capacity_class
 from shift_model.random_numbers import uniform
 from shift_model.vocabulary import GAZES, GazeClass, Triple
 from shift_schemas.errors import InvalidSettings
 from shift_study.constants import CapacitySettings
 from shift_study.study import Study
 
-from shift_simulator.batched_sessions import action_costs
 from shift_simulator.random_streams import (
     COIN,
     DEVIATES,
@@ -73,11 +72,8 @@ class SimulatedPerson:
 
     def after(self, action: int) -> SimulatedPerson:
         """Return the person after an explanation with this action, by the capacity equation."""
-        s = self._settings
-        capacity = next_capacity(
-            self.capacity, action == self.previous, float(action_costs(s, self.study)[action]),
-            recovery=s.recovery, minimum=s.min, maximum=s.max,
-        )  # fmt: skip
+        cost = self._settings.cost_of(self.study.scoring.actions[action])
+        capacity = self._settings.after(self.capacity, action == self.previous, cost)
         return replace(self, capacity=capacity, previous=action)
 
     @cached_property

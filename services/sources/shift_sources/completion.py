@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+from shift_runtime.deadline import Deadline
+
 
 class Completion:
     """Counts what a queue received and what it finished."""
@@ -32,12 +34,9 @@ class Completion:
 
         Returns whether it is, after ``timeout_s`` seconds at most.
         """
-        mark = self._received
-        try:
-            async with asyncio.timeout(timeout_s):
-                while self._finished < mark:
-                    self._changed.clear()
-                    await self._changed.wait()
-        except TimeoutError:
-            return False
+        mark, deadline = self._received, Deadline(timeout_s)
+        while self._finished < mark:
+            self._changed.clear()
+            if not await deadline.is_set(self._changed):
+                return False
         return True

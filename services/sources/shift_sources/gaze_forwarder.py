@@ -8,6 +8,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 import structlog
+from shift_runtime.deadline import Deadline
 from shift_runtime.mesh_api import MeshApi
 from shift_schemas.errors import MalformedMessage, ShiftError, Unavailable
 
@@ -94,11 +95,7 @@ class GazeForwarder:
 
     async def _wait_for_more(self) -> None:
         self._ready.clear()
-        try:
-            async with asyncio.timeout(self._batching.wait_s):
-                await self._ready.wait()
-        except TimeoutError:
-            return
+        await Deadline(self._batching.wait_s).is_set(self._ready)
 
     async def _send(self, taken: list[GazeArrival]) -> None:
         samples = sum(len(a.chunk.t) for a in taken)

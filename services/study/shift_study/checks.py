@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 
 from shift_model.thresholds import below
 from shift_model.vocabulary import TRIPLES
-from shift_schemas.errors import FieldError
 
-from shift_study.area_checks import area_mistakes, area_warnings
+from shift_study.area_checks import area_warnings
 from shift_study.learner_settings import LEARNER_SETTINGS, LearnerSettings, parameters_of
 from shift_study.loading import study_in_force
 from shift_study.scoring import scores
@@ -48,11 +47,6 @@ PLAUSIBLE: dict[str, Plausible] = {
     "decider.wait_s": Plausible("a wait in seconds", 0, 60, "ms", 1e-3),
 }
 """Chosen wide: a value outside is probably in another unit."""
-
-
-def study_mistakes(study: Study) -> tuple[FieldError, ...]:
-    """Return the mistakes that are refused when a study is read from a file or given at a start."""
-    return area_mistakes(study.aois)
 
 
 def study_warnings(study: Study) -> tuple[str, ...]:

@@ -6,11 +6,17 @@ description says.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any, Literal, overload
 
 from pydantic import Field, model_validator
+from shift_model.capacity import next_capacity, strategy_cost
 
 from shift_study.fields import Level, NonNegative, Positive, Probability, StudyPart
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class CapacitySettings(StudyPart):
@@ -34,6 +40,18 @@ class CapacitySettings(StudyPart):
         if not self.min <= self.start <= self.max:
             raise ValueError(f"min <= start <= max must hold; it is {self.min} <= {self.start} <= {self.max}")
         return self
+
+    def cost_of(self, levels: Iterable[str]) -> float:
+        """Return the cost of a strategy with these levels (:func:`shift_model.capacity.strategy_cost`)."""
+        return strategy_cost(levels, self.demanding, self.demanding_cost, self.other_cost)
+
+    @overload
+    def after(self, value: float, repeated: bool, cost: float) -> float: ...
+    @overload
+    def after(self, value: NDArray[Any], repeated: Any, cost: Any) -> NDArray[np.float64]: ...
+    def after(self, value: Any, repeated: Any, cost: Any) -> Any:
+        """Return the capacity after one executed strategy (:func:`shift_model.capacity.next_capacity`)."""
+        return next_capacity(value, repeated, cost, recovery=self.recovery, minimum=self.min, maximum=self.max)
 
 
 class AttentionSettings(StudyPart):

@@ -8,15 +8,14 @@ A policy changes no estimate, and each output names the policy that was in force
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
-from typing import NoReturn, Protocol
+from typing import NoReturn
 
 from shift_decider.core import DeciderState, step
 from shift_schemas.messages import Command, Config, Decide, Decision, Estimate, Fact, Observation, Override, Seen
 
 from shift_verify.decider_before_format_3 import DeciderSearch
-from shift_verify.decider_outputs import DeciderOutputs, is_of_task, override_command
+from shift_verify.decider_outputs import DeciderDerivation, DeciderOutputs, is_of_task, override_command
 from shift_verify.difference import Placed, differ, is_missing
 from shift_verify.inputs import Inputs
 
@@ -24,44 +23,23 @@ FIRST_FORMAT_OF_FOLD = 3
 """The first format in which the outputs record the order of the inputs, and a decision what it required."""
 
 
-class DeciderVerification(Protocol):
-    """A way of deriving the decider's outputs. Hand each observation to :meth:`take`, then call :meth:`end`."""
-
-    @property
-    def checked(self) -> Counter[str]:
-        """The number of outputs that are as derived, by subject."""
-
-    def take(self, observation: Observation) -> None:
-        """Derive the outputs up to the next observation. Raises ``Differs``, ``NotRecorded``."""
-
-    def end(self) -> None:
-        """Derive the rest: no more observations follow. Raises ``Differs``, ``NotRecorded``."""
-
-
 def decider_verification(
     inputs: Inputs, outputs: Sequence[Placed], following: Placed | None = None
-) -> DeciderVerification:
+) -> DeciderDerivation:
     """Return the verification for the format of the session; see :class:`DeciderOutputs` for the parameters."""
     kind = DeciderFold if inputs.session.format >= FIRST_FORMAT_OF_FOLD else DeciderSearch
     return kind(inputs, DeciderOutputs(inputs, outputs, following))
 
 
-class DeciderFold:
+class DeciderFold(DeciderDerivation):
     """Estimates, decisions and overrides of a session of format 3 or later, as a fold over its inputs."""
 
     def __init__(self, inputs: Inputs, outputs: DeciderOutputs) -> None:
-        self.inputs = inputs
-        self.outputs = outputs
-        self.observed = 0
+        super().__init__(inputs, outputs)
         self.state: DeciderState = step(None, inputs.session, inputs.session.stamp).state
         self._stopped = False
         self._latest_required: Placed | None = None
         """The decision that required the latest observation."""
-
-    @property
-    def checked(self) -> Counter[str]:
-        """The number of outputs that are as derived, by subject."""
-        return self.outputs.checked
 
     @property
     def configured(self) -> int:
@@ -70,20 +48,15 @@ class DeciderFold:
 
     def take(self, observation: Observation) -> None:
         """Derive the outputs up to the next observation. Raises ``Differs``, ``NotRecorded``."""
-        self._derive_outputs()
+        self.derive_outputs()
         if self.observed == 0:
             self._apply_first_configs()
         self.observed += 1
         self._apply(observation)
-        self._derive_outputs()
+        self.derive_outputs()
 
-    def end(self) -> None:
-        """Derive the rest: no more observations follow. Raises ``Differs``, ``NotRecorded``."""
-        self._derive_outputs()
-        if not self.inputs.complete:
-            return
-        if (target := self.outputs.target) is not None:
-            differ(target, "seen.observation", target.fact.seen.observation, self.observed)
+    def apply_rest(self) -> None:
+        """Apply the last configurations, and check the latest requirement."""
         for version in range(self.configured + 1, self.inputs.last("config") + 1):
             self._apply(self.inputs.numbered["config"][version])
         if (latest := self._latest_required) is not None:
@@ -152,7 +125,7 @@ class DeciderFold:
 
     # --- outputs ---
 
-    def _derive_outputs(self) -> None:
+    def derive_outputs(self) -> None:
         """Derive every output that has seen no more observations than were applied."""
         while not self._stopped and (target := self.outputs.target) is not None:
             seen = target.fact.seen

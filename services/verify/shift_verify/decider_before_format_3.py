@@ -9,14 +9,13 @@ Policies change no estimate, and each output names the policy that was in force.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from itertools import product
 
 from shift_decider.core import DeciderState, step
 from shift_schemas.messages import Command, Config, Decide, Decision, Estimate, Fact, Observation, Override, Seen
 
-from shift_verify.decider_outputs import DeciderOutputs, is_of_task, override_command
+from shift_verify.decider_outputs import DeciderDerivation, DeciderOutputs, is_of_task, override_command
 from shift_verify.difference import Differs, Placed, differ, is_missing
 from shift_verify.inputs import Inputs
 
@@ -24,13 +23,12 @@ Transition = tuple[DeciderState, Observation | Config]
 """A state, and an input that leads on from it."""
 
 
-class DeciderSearch:
+class DeciderSearch(DeciderDerivation):
     """Estimates, decisions and overrides of a session of format 1 or 2, by a search for the order of its inputs."""
 
     def __init__(self, inputs: Inputs, outputs: DeciderOutputs) -> None:
-        self.inputs = inputs
-        self.outputs = outputs
-        self.observed = self.configured = 0
+        super().__init__(inputs, outputs)
+        self.configured = 0
         self.latest: Observation | None = None
         self.unrecorded: Fact | None = None
         """An estimate that would follow from some order of the inputs, and that the outputs do not have there."""
@@ -40,14 +38,9 @@ class DeciderSearch:
         """By the number of further configurations: the state that is reached without an output, or ``None``."""
         self._extend_column()
 
-    @property
-    def checked(self) -> Counter[str]:
-        """The number of outputs that are as derived, by subject."""
-        return self.outputs.checked
-
     def take(self, observation: Observation) -> None:
         """Derive the outputs up to the next observation. Raises :class:`Differs`, ``NotRecorded``."""
-        self._derive_outputs()
+        self.derive_outputs()
         self.observed += 1
         self.latest = observation
         self.before, self.column = self.column, []
@@ -55,15 +48,10 @@ class DeciderSearch:
             transitions: list[Transition] = [(from_left, observation)] if from_left else []
             transitions += self._by_config(k)
             self.column.append(self._without_output(transitions))
-        self._derive_outputs()
+        self.derive_outputs()
 
-    def end(self) -> None:
-        """Derive the rest: no more observations follow. Raises :class:`Differs`, ``NotRecorded``."""
-        self._derive_outputs()
-        if not self.inputs.complete:
-            return
-        if (target := self.outputs.target) is not None:
-            differ(target, "seen.observation", target.fact.seen.observation, self.observed)
+    def apply_rest(self) -> None:
+        """Raise the estimate that the last inputs should have published."""
         if self.column[-1] is None and self.unrecorded is not None:
             is_missing("estimate", self.outputs.sequence + 1, 2**62, "the last inputs change one", self.unrecorded)
 
@@ -96,7 +84,7 @@ class DeciderSearch:
 
     # --- an output ---
 
-    def _derive_outputs(self) -> None:
+    def derive_outputs(self) -> None:
         """Derive every output that has seen no more observations than were taken."""
         while (target := self.outputs.target) is not None and target.fact.seen.observation <= self.observed:
             k = self._row(target)

@@ -12,7 +12,7 @@ from typing import NoReturn
 
 from shift_decider.core import DeciderState, step
 from shift_schemas.errors import ShiftError
-from shift_schemas.messages import Command, Decision, Estimate, Fact, Override, Policy, SetOverride
+from shift_schemas.messages import Command, Decision, Estimate, Fact, Observation, Override, Policy, SetOverride
 
 from shift_verify.difference import Differs, Placed, compare, differ, is_missing, name_of
 from shift_verify.inputs import Inputs
@@ -130,6 +130,41 @@ class DeciderOutputs:
                     differ(target, f"seen.{field}", n, None, f"seen.{field} is {n}, and {after} in the next output")
         why = f"it must have been published before {name_of(target.fact.subject, target.sequence)}"
         is_missing("estimate", target.sequence, target.place, why, derived)
+
+
+class DeciderDerivation:
+    """A way of deriving the decider's outputs. Hand each observation to :meth:`take`, then call :meth:`end`."""
+
+    def __init__(self, inputs: Inputs, outputs: DeciderOutputs) -> None:
+        self.inputs = inputs
+        self.outputs = outputs
+        self.observed = 0
+
+    @property
+    def checked(self) -> Counter[str]:
+        """The number of outputs that are as derived, by subject."""
+        return self.outputs.checked
+
+    def take(self, observation: Observation) -> None:
+        """Derive the outputs up to the next observation. Raises :class:`Differs`, ``NotRecorded``."""
+        raise NotImplementedError
+
+    def end(self) -> None:
+        """Derive the rest: no more observations follow. Raises :class:`Differs`, ``NotRecorded``."""
+        self.derive_outputs()
+        if not self.inputs.complete:
+            return
+        if (target := self.outputs.target) is not None:
+            differ(target, "seen.observation", target.fact.seen.observation, self.observed)
+        self.apply_rest()
+
+    def derive_outputs(self) -> None:
+        """Derive every output that has seen no more observations than were taken."""
+        raise NotImplementedError
+
+    def apply_rest(self) -> None:
+        """Apply the inputs after the last output of a whole recording, and raise what they should have published."""
+        raise NotImplementedError
 
 
 def _stands_for_later(recorded: Sequence[Placed], derived: Sequence[Fact]) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from shift_model.capacity import is_high, next_capacity, strategy_cost
+from shift_model.capacity import is_high
 from shift_study.constants import CapacitySettings
 from shift_study.study import Study
 
@@ -32,11 +32,6 @@ class CapacityModel(NamedTuple):
     high: Ints
     """[values]: the capacity class of each value, 1 for high."""
 
-    def after(self, capacity: Floats, repeated: Ints | bool, cost: Floats | float) -> Floats:
-        """Return the capacity after an action, off the lattice, by the study's equation."""
-        s = self.settings
-        return next_capacity(capacity, repeated, cost, recovery=s.recovery, minimum=s.min, maximum=s.max)
-
     def class_of(self, capacity: Floats) -> Ints:
         """Return the class of each capacity, 1 for high."""
         return is_high(capacity, self.settings.threshold).astype(np.int64)
@@ -54,22 +49,20 @@ def capacity_model_of(study: Study) -> CapacityModel:
     On a grid each move leads to the nearest value.
     """
     s = study.capacity
-    costs = [strategy_cost(levels, s.demanding, s.demanding_cost, s.other_cost) for levels in study.scoring.actions]
+    costs = [s.cost_of(levels) for levels in study.scoring.actions]
     values = _reachable(s, set(costs))
-    moves = {"recovery": s.recovery, "minimum": s.min, "maximum": s.max}
-    up = _nearest(values, next_capacity(values, True, 0.0, **moves))
-    down = np.stack([_nearest(values, next_capacity(values, False, cost, **moves)) for cost in costs])
+    up = _nearest(values, s.after(values, True, 0.0))
+    down = np.stack([_nearest(values, s.after(values, False, cost)) for cost in costs])
     return CapacityModel(s, np.array(costs), values, up, down, is_high(values, s.threshold).astype(np.int64))
 
 
 def _reachable(s: CapacitySettings, costs: set[float]) -> Floats:
     """Return all values that actions lead to from the start; values that differ by rounding are one."""
-    moves = {"recovery": s.recovery, "minimum": s.min, "maximum": s.max}
     found = {round(s.start, 9)}
     queue = list(found)
     for value in queue:
         steps = [(True, 0.0), *((False, cost) for cost in sorted(costs))]
-        for after in (round(next_capacity(value, repeated, cost, **moves), 9) for repeated, cost in steps):
+        for after in (round(s.after(value, repeated, cost), 9) for repeated, cost in steps):
             if after not in found:
                 found.add(after)
                 queue.append(after)

@@ -81,7 +81,7 @@ def on_decision(model: Model, state: State, triple: Ints, action: Ints) -> State
     transitions[state.gaze[runs], gaze[runs], runs] += 1
     return replace(
         state,
-        capacity=capacity_model.after(capacity, action == state.previous, capacity_model.costs[action]),
+        capacity=capacity_model.settings.after(capacity, action == state.previous, capacity_model.costs[action]),
         previous=action,
         gaze=gaze,
         transitions=transitions,
