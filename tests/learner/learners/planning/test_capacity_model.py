@@ -32,5 +32,5 @@ def test_level_is_the_nearest_value_of_the_observed_class() -> None:
 
 def test_capacity_after_an_action_follows_the_equation() -> None:
     model = capacity_model_of(STUDY)
-    after = model.after(np.array([0.5, 0.5]), np.array([True, False]), np.array([0.2, 0.2]))
+    after = model.settings.after(np.array([0.5, 0.5]), np.array([True, False]), np.array([0.2, 0.2]))
     assert after.tolist() == pytest.approx([0.8, 0.3])
