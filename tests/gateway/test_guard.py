@@ -53,7 +53,7 @@ async def test_page_of_another_origin_changes_nothing(mesh: Mesh) -> None:
     assert await session.read() == before
 
 
-@pytest.mark.parametrize("path", ["/", "/docs", "/healthz", "/readyz", "/metrics", "/nowhere", "/v1/sessions"])
+@pytest.mark.parametrize("path", ["/docs", "/healthz", "/readyz", "/metrics", "/nowhere", "/v1/sessions"])
 async def test_foreign_host_is_refused_on_every_path(mesh: Mesh, path: str) -> None:
     found = problem(await mesh.ask("GET", path, headers={"Host": "evil.example:80"}), 421)
     assert "SHIFT_HOSTS=evil.example" in found["detail"]
@@ -111,7 +111,7 @@ async def test_answers_and_errors_carry_cors_headers_for_a_named_origin_only(lab
 
 # --- HEAD, OPTIONS, and what is not there ---
 
-GETS = ("/", "/docs", "/docs/start.js", "/docs/swagger-ui.css", "/openapi.json", "/favicon.ico", "/healthz", "/readyz",
+GETS = ("/docs", "/docs/start.js", "/docs/swagger-ui.css", "/openapi.json", "/favicon.ico", "/healthz", "/readyz",
         "/v1/sessions", "/v1/recordings")  # fmt: skip
 
 PLAIN = {"Accept-Encoding": "identity"}
@@ -174,7 +174,7 @@ async def test_unknown_path_is_not_redirected_and_gets_a_proposal(
 
 
 async def test_pages_load_nothing_from_another_host(mesh: Mesh) -> None:
-    for path in ("/", "/docs", "/docs/start.js", "/favicon.ico"):
+    for path in ("/docs", "/docs/start.js", "/favicon.ico"):
         text = (await mesh.ask("GET", path)).text.replace("http://www.w3.org/2000/svg", "")
         assert not re.findall(r"""(?:https?:)?//[a-z0-9.-]+\.[a-z]{2,}""", text), path
         for linked in re.findall(r"""(?:src|href)=["']([^"']+)""", text):
@@ -183,7 +183,7 @@ async def test_pages_load_nothing_from_another_host(mesh: Mesh) -> None:
 
 
 async def test_every_answer_has_the_security_headers(mesh: Mesh) -> None:
-    for path in ("/", "/docs", "/healthz", "/nowhere", "/v1/sessions/**", "/docs/swagger-ui-bundle.js"):
+    for path in ("/docs", "/healthz", "/nowhere", "/v1/sessions/**", "/docs/swagger-ui-bundle.js"):
         headers = (await mesh.ask("GET", path)).headers
         assert headers["x-content-type-options"] == "nosniff"
         assert headers["referrer-policy"] == "same-origin"

@@ -23,6 +23,7 @@ from shift_gateway.read_paths import add_reads
 from shift_gateway.recordings import add_recordings
 from shift_gateway.settings import GatewaySettings
 from shift_gateway.studies import add_studies
+from shift_gateway.web.late_mount import PageRoute
 
 Opener = Callable[[], Awaitable[Bus]]
 
@@ -30,11 +31,13 @@ Opener = Callable[[], Awaitable[Bus]]
 def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastAPI:
     """Return the application. It calls ``open_bus`` when it starts, in its own event loop."""
     gateway = Gateway(settings)
+    pages = PageRoute(gateway)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         async with gateway.on(await open_bus(), clock):
             yield
+            await pages.close()
 
     app = GatewayApp(
         Rules(settings.host, settings.hosts, settings.origins),
@@ -51,6 +54,7 @@ def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastA
         add(app, gateway)
     add_studies(app, settings.data / "studies")
     add_docs(app)
+    app.router.routes.append(pages)
     return app
 
 

@@ -1,16 +1,15 @@
-"""The paths for operators: liveness, readiness, metrics and the web page."""
+"""The paths for operators: liveness, readiness and metrics."""
 
 from __future__ import annotations
 
 import asyncio
 
 from fastapi import FastAPI, Response
-from fastapi.responses import HTMLResponse, JSONResponse
+from fastapi.responses import JSONResponse
 from shift_schemas.registry import OWNERS
 
 from shift_gateway.gateway import Gateway
 from shift_gateway.merged_metrics import merged_metrics
-from shift_gateway.page import PAGE, PAGE_POLICY
 from shift_gateway.readiness import readiness
 
 
@@ -35,7 +34,3 @@ def add_operations(app: FastAPI, gateway: Gateway) -> None:
         texts = await asyncio.gather(*(gateway.mesh.metrics(service) for service in (*OWNERS, "ros2_bridge")))
         text = merged_metrics([gateway.metrics_text(), *(t for t in texts if t)])
         return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")
-
-    @app.get("/", include_in_schema=False)
-    async def page() -> HTMLResponse:
-        return HTMLResponse(PAGE, headers={"Content-Security-Policy": PAGE_POLICY})

@@ -1,0 +1,34 @@
+"""The NiceGUI application: its settings, and every page. Importing this module imports NiceGUI."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+os.environ.setdefault("NICEGUI_STORAGE_PATH", os.devnull)  # the page keeps nothing on the server
+
+from fastapi import FastAPI
+from nicegui import app as nicegui_app
+from nicegui import ui
+
+from shift_gateway.docs_page import ICON
+from shift_gateway.gateway import Gateway
+from shift_gateway.web.live_histories import LiveHistories
+from shift_gateway.web.room_page import add_room_page
+
+ASSETS = Path(__file__).parent / "assets"
+RECONNECT_S = 10.0
+"""How long the state of a page is kept while its browser has no connection, seconds; chosen: longer than a restart."""
+
+
+def make_pages(gateway: Gateway) -> FastAPI:
+    """Return the application with every page of the gateway."""
+    app = FastAPI(openapi_url=None)
+    nicegui_app.add_static_files("/page-assets", ASSETS, max_cache_age=0)
+    histories = LiveHistories(gateway)
+    add_room_page(gateway, histories)
+    ui.run_with(
+        app, title="SHIFT mesh", favicon=ICON, dark=None, language="en-US", tailwind=False, show_welcome_message=False,
+        reconnect_timeout=RECONNECT_S, gzip_middleware_factory=None, binding_refresh_interval=None,
+    )  # fmt: skip
+    return app

@@ -1,0 +1,113 @@
+// What the browser does itself: charts get points (not all options again), colours follow light and dark,
+// and what is shown is marked as old when nothing was heard for two seconds.
+(() => {
+  const OLD_MS = 2500;
+  const COLOURS = { // Okabe and Ito's palette, safe for colour blindness; text has at least 4.5:1 on its background
+    light: { text: '#1b2733', line: '#b9c3cd', series: ['#0072b2', '#b34700', '#1b2733'], gap: 'rgba(90,100,110,.25)' },
+    dark: { text: '#e6edf3', line: '#48525c', series: ['#56b4e9', '#e69f00', '#e6edf3'], gap: 'rgba(170,180,190,.25)' },
+  };
+  const isDark = () => document.body.classList.contains('body--dark');
+  const colours = () => COLOURS[isDark() ? 'dark' : 'light'];
+  const strips = {};
+  const chartOf = (id) => { const e = getElement(id); return e && e.chart; };
+
+  const themed = (chart) => {
+    const c = colours(), options = chart.getOption();
+    const axes = (list) => (list || []).map(() => ({
+      axisLabel: { color: c.text }, axisLine: { lineStyle: { color: c.line } },
+      splitLine: { lineStyle: { color: c.line } }, nameTextStyle: { color: c.text } }));
+    const update = { color: c.series, textStyle: { color: c.text }, legend: { textStyle: { color: c.text } },
+      xAxis: axes(options.xAxis), yAxis: axes(options.yAxis) };
+    if (options.visualMap && options.visualMap.length) update.visualMap = [{ textStyle: { color: c.text } }];
+    chart.setOption(update);
+  };
+  const allCharts = () => [...document.querySelectorAll('.nicegui-echart')].map((e) => {
+    const id = Number(e.id.slice(1)); return chartOf(id); }).filter(Boolean);
+  const retheme = () => allCharts().forEach(themed);
+
+  const drawStrip = (id, nowMs) => {
+    const s = strips[id], chart = chartOf(id);
+    if (!s || !chart) return;
+    const first = nowMs - s.windowMs, c = colours();
+    s.points = s.points.filter((p) => p[0] >= first - 5000);
+    const mark = (list, kind) => list.filter((m) => m[0] >= first).map(([t, label]) => ({
+      xAxis: t, label: { formatter: label, color: c.text, position: kind === 'decision' ? 'end' : 'insideEndTop', show: kind === 'decision' || label !== '' },
+      lineStyle: { color: c.text, type: kind === 'decision' ? 'solid' : 'dotted', width: kind === 'decision' ? 1 : 2 } }));
+    const range = { min: first, max: nowMs };
+    chart.setOption({
+      xAxis: [range, range],
+      series: [
+        { data: s.points.map((p) => [p[0], p[1]]),
+          markLine: { symbol: 'none', silent: true, data: [
+            { yAxis: s.threshold, label: { formatter: '' }, lineStyle: { color: c.line, type: 'dashed' } },
+            ...mark(s.decisions, 'decision'), ...mark(s.markers, 'marker')] },
+          markArea: { silent: true, itemStyle: { color: c.gap, decal: { symbol: 'rect', dashArrayX: [1, 0],
+            dashArrayY: [2, 5], rotation: -Math.PI / 4, color: c.line } },
+            data: s.gaps.map(([a, b]) => [{ xAxis: a }, { xAxis: b }]) } },
+        { data: s.points.map((p) => [p[0], p[2]]) },
+        { data: s.points.filter((p) => p[3]).map((p) => [p[0], p[3]]), itemStyle: { color: c.series[0] } },
+      ] });
+  };
+
+  const shift = window.shift = {
+    strip(id, windowMs, threshold) { strips[id] = { windowMs, threshold, points: [], decisions: [], markers: [], gaps: [] }; },
+    stripUpdate(id, nowMs, points, marks) {
+      const s = strips[id];
+      if (!s) return;
+      s.points.push(...points);
+      Object.assign(s, marks);
+      drawStrip(id, nowMs);
+    },
+    stimulus(points, aois) {
+      for (const old of document.querySelectorAll('.stimulus .gaze-point')) old.remove();
+      for (const svg of document.querySelectorAll('.stimulus svg')) {
+        for (const [, x, y] of points) {
+          const dot = document.createElementNS('http://www.w3.org/2000/svg', 'circle');
+          dot.setAttribute('class', 'gaze-point'); dot.setAttribute('r', '1.6');
+          dot.setAttribute('cx', 100 * x); dot.setAttribute('cy', 60 * y);
+          svg.append(dot);
+        }
+        for (const shape of svg.querySelectorAll('[data-aoi]'))
+          shape.classList.toggle('looked-at', aois.includes(shape.dataset.aoi));
+      }
+    },
+    heard(ms) { shift.last = Date.now(); shift.lastText = new Date(ms).toLocaleTimeString(); shift.mark(); },
+    mark() {
+      const banner = document.querySelector('.old-values');
+      if (!banner || !shift.last) return;
+      const old = Date.now() - shift.last > OLD_MS;
+      document.body.classList.toggle('is-old', old);
+      const text = old ? `Old values: last heard from the mesh at ${shift.lastText}. The page goes on by itself.` : '';
+      if (banner.textContent !== text) banner.textContent = text;
+    },
+    theme(next) {
+      if (next) localStorage.setItem('shift-theme', next);
+      return localStorage.getItem('shift-theme') || 'auto';
+    },
+    shortcuts(on) {
+      if (on !== undefined) localStorage.setItem('shift-shortcuts', on ? 'on' : 'off');
+      return localStorage.getItem('shift-shortcuts') !== 'off';
+    },
+  };
+
+  // One key each: [m] marker, [o] override, [e] end. A key that is typed into a field, or with a modifier, is not one.
+  document.addEventListener('keydown', (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || !shift.shortcuts()) return;
+    if (event.target.closest('input, textarea, select, [contenteditable=true], .q-dialog')) return;
+    const target = document.querySelector(`[data-shortcut="${CSS.escape(event.key)}"]`);
+    if (!target) return;
+    event.preventDefault();
+    const field = target.matches('input') ? target : target.querySelector('input');
+    if (field) field.focus(); else target.click();
+  });
+
+  document.addEventListener('DOMContentLoaded', () => {
+    setInterval(shift.mark, 500);
+    new MutationObserver(retheme).observe(document.body, { attributes: true, attributeFilter: ['class'] });
+    new MutationObserver((changes) => {
+      if (changes.some((c) => [...c.addedNodes].some((n) => n.querySelector &&
+          (n.matches('.nicegui-echart') || n.querySelector('.nicegui-echart'))))) setTimeout(retheme, 200);
+    }).observe(document.body, { childList: true, subtree: true });
+    setTimeout(retheme, 500);
+  });
+})();

@@ -1,0 +1,120 @@
+"""The histories of the sessions that a page shows now. Without an open page there is none, and nothing is kept."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+
+from shift_runtime.bus.protocol import Reply, first_answer
+from shift_runtime.read_model import SessionView
+from shift_runtime.reader import PULL_TIMEOUT_S, fact_of
+from shift_schemas.codec import decode, encode
+from shift_schemas.errors import MalformedMessage, Unavailable
+from shift_schemas.keys import ServiceKey, build_key
+from shift_schemas.messages import Fact, Observation, OutboxPage, OutboxQuery
+from shift_schemas.registry import OWNERS
+
+from shift_gateway.gateway import Gateway
+from shift_gateway.web.history import SessionHistory
+
+TAIL = {Observation.owner: 6000}
+"""The owner of gaze is read from this many messages before its end: about five minutes at eight chunks a second."""
+
+
+@dataclass
+class _Followed:
+    """One session that at least one page shows."""
+
+    history: SessionHistory = field(default_factory=SessionHistory)
+    pages: int = 0
+    loading: asyncio.Task[None] | None = None
+    waiting: list[Fact] | None = field(default_factory=list)
+    """Facts that came while the earlier ones were read; None afterwards."""
+
+    def on_fact(self, fact: Fact, payload: str) -> None:
+        """Apply a fact of the read model."""
+        if self.waiting is not None:
+            self.waiting.append(fact)
+        else:
+            self.history.apply(fact)
+
+
+class LiveHistories:
+    """Reads a session from its start when the first page shows it, and follows it until the last page is closed."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._followed: dict[str, _Followed] = {}
+
+    async def open(self, session: str) -> SessionHistory:
+        """Return the history of a session, read from its start. :meth:`close` must follow.
+
+        Raises
+        ------
+        UnknownThing
+            There is no such session.
+        Unavailable
+            A service does not answer.
+        """
+        view = await self._gateway.read_model.view(session)
+        followed = self._followed.get(session)
+        if followed is None:
+            followed = self._followed[session] = _Followed()
+            followed.loading = asyncio.create_task(self._load(session, view, followed))
+        followed.pages += 1
+        assert followed.loading is not None
+        try:
+            await asyncio.shield(followed.loading)
+        except BaseException:
+            self.close(session)
+            raise
+        return followed.history
+
+    def close(self, session: str) -> None:
+        """Forget the session if no other page shows it."""
+        followed = self._followed[session]
+        followed.pages -= 1
+        if followed.pages == 0:
+            del self._followed[session]
+            assert followed.loading is not None
+            followed.loading.cancel()
+            view = self._gateway.read_model.views.get(session)
+            if view is not None and followed.on_fact in view.listeners:
+                view.listeners.remove(followed.on_fact)
+
+    async def _load(self, session: str, view: SessionView, followed: _Followed) -> None:
+        """Read what the read model has read already, and then apply what came meanwhile."""
+        cursors = {owner: self._gateway.read_model.reader.cursors.get((session, owner), 0) for owner in OWNERS}
+        view.listeners.append(followed.on_fact)
+        for owner, cursor in cursors.items():
+            await self._read(session, owner, cursor, followed.history)
+        waiting, followed.waiting = followed.waiting or [], None
+        for fact in waiting:
+            followed.history.apply(fact)
+
+    async def _read(self, session: str, owner: str, last: int, history: SessionHistory) -> None:
+        first = max(0, last - TAIL.get(owner, last))
+        while first < last:
+            page = await self._page(owner, OutboxQuery(cursors={session: first}, only=[session], closed=True))
+            for row in page.rows:
+                if first < row.seq <= last:
+                    history.apply(fact_of(row))
+            if not page.rows:
+                return
+            first = page.rows[-1].seq
+            await asyncio.sleep(0)
+
+    async def _page(self, owner: str, query: OutboxQuery) -> OutboxPage:
+        bus = self._gateway.mesh.bus
+        key = build_key(ServiceKey(owner, "outbox"))
+        page = await first_answer(bus, key, encode(query), timeout_s=PULL_TIMEOUT_S, read=_page_of)
+        if page is None:
+            raise Unavailable(f"the {owner} does not answer")
+        return page
+
+
+def _page_of(reply: Reply) -> OutboxPage | None:
+    try:
+        return decode(OutboxPage, reply.payload) if reply.ok else None
+    except MalformedMessage:
+        return None
