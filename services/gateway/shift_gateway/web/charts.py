@@ -62,7 +62,7 @@ def strip_points(history: SessionHistory, after_ns: int, until_ns: int) -> list[
 
 
 def strip_marks(history: SessionHistory, now_ns: int) -> dict[str, Any]:
-    """Return what is drawn over the strip: decisions and markers as ``[ms, label]``, gaps as ``[first ms, last ms]``."""
+    """Return what is drawn over the strip: decisions and markers as ``[ms, label]``, gaps as ``[first, last]``, ms."""
     first_ns = now_ns - int(WINDOW_S * 1e9)
     decisions = [[ns // 1_000_000, str(d.n)] for ns, d in history.decisions.between(first_ns, now_ns)]
     markers = [[ns // 1_000_000, shortened(m.text)] for ns, m in history.markers.between(first_ns, now_ns)]

@@ -43,7 +43,7 @@ class PageRoute(BaseRoute):
         return (Match.FULL if is_page else Match.NONE), {}
 
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass the request on to NiceGUI, which the first request loads. HEAD is answered as GET; the server cuts it."""
+        """Pass the request on to NiceGUI, which the first request loads. HEAD is answered as GET without its body."""
         await self.load()
         if scope.get("method") == "HEAD":
             scope = {**scope, "method": "GET"}
