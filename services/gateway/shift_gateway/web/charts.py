@@ -22,7 +22,7 @@ def strip_options(aois: Sequence[str], threshold: float) -> dict[str, Any]:
     return {
         "animation": False,
         "aria": {"enabled": True, "decal": {"show": True}},
-        "legend": {"data": ["capacity", "focus shift"], "top": 0, "right": 10},
+        "legend": {"data": ["capacity", "focus shift"], "left": 90, "top": "55%", "icon": "roundRect", "itemHeight": 4},
         "grid": [
             {"left": 90, "right": 12, "top": 26, "height": "42%"},
             {"left": 90, "right": 12, "bottom": 24, "height": f"{min(8 + 7 * len(aois), 34)}%"},

@@ -21,7 +21,7 @@ from shift_gateway.web.live_histories import LiveHistories
 from shift_gateway.web.live_page import live_session_page
 from shift_gateway.web.room_view import WINDOW_S, RoomView, room_view
 
-LONG_SAY = 26
+LONG_SAY = 40
 """A longer text is shown a little smaller, so that it fits; characters."""
 TOOLTIPS = {
     "say": "How the robot phrases its next explanation: the last decision's strategy (paper, section III-B).",
@@ -246,6 +246,7 @@ class RoomPage:
                     explain(
                         label, f"Gaze source {name}: its rate and loss in the last 5 s, and the age of its last sample."
                     )
+                self._gaze_row.classes(**_toggled("many", len(self._sources) > 1))
             label = self._sources[name]
             label.text = f"GAZE {quality.text}" if len(view.sources) == 1 else f"{name} {quality.text}"
             label.classes(replace=quality.level)

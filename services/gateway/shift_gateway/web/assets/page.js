@@ -3,8 +3,8 @@
 (() => {
   const OLD_MS = 2500;
   const COLOURS = { // Okabe and Ito's palette, safe for colour blindness; text has at least 4.5:1 on its background
-    light: { text: '#1b2733', line: '#b9c3cd', series: ['#0072b2', '#b34700', '#1b2733'], gap: 'rgba(90,100,110,.25)' },
-    dark: { text: '#e6edf3', line: '#48525c', series: ['#56b4e9', '#e69f00', '#e6edf3'], gap: 'rgba(170,180,190,.25)' },
+    light: { text: '#1b2733', line: '#b9c3cd', series: ['#0072b2', '#b34700', '#1b2733'], gap: 'rgba(60,70,80,.55)' },
+    dark: { text: '#e6edf3', line: '#48525c', series: ['#56b4e9', '#e69f00', '#e6edf3'], gap: 'rgba(190,200,210,.55)' },
   };
   const isDark = () => document.body.classList.contains('body--dark');
   const colours = () => COLOURS[isDark() ? 'dark' : 'light'];
@@ -41,12 +41,23 @@
           markLine: { symbol: 'none', silent: true, data: [
             { yAxis: s.threshold, label: { formatter: '' }, lineStyle: { color: c.line, type: 'dashed' } },
             ...mark(s.decisions, 'decision'), ...mark(s.markers, 'marker')] },
-          markArea: { silent: true, itemStyle: { color: c.gap, decal: { symbol: 'rect', dashArrayX: [1, 0],
-            dashArrayY: [2, 5], rotation: -Math.PI / 4, color: c.line } },
-            data: s.gaps.map(([a, b]) => [{ xAxis: a }, { xAxis: b }]) } },
+          markArea: { silent: true, itemStyle: { color: hatch(c.gap) }, data: s.gaps.map(([a, b]) => [{ xAxis: a }, { xAxis: b }]) } },
         { data: s.points.map((p) => [p[0], p[2]]) },
         { data: s.points.filter((p) => p[3]).map((p) => [p[0], p[3]]), itemStyle: { color: c.series[0] } },
       ] });
+  };
+
+  const hatches = {};
+  const hatch = (colour) => { // a pattern of diagonal lines; ECharts draws no decal in a markArea
+    if (!hatches[colour]) {
+      const canvas = document.createElement('canvas'), size = canvas.width = canvas.height = 8;
+      const pen = canvas.getContext('2d');
+      pen.strokeStyle = colour; pen.lineWidth = 2; pen.beginPath();
+      for (const at of [-size, 0, size]) { pen.moveTo(at, size); pen.lineTo(at + size, 0); }
+      pen.stroke();
+      hatches[colour] = { image: canvas, repeat: 'repeat' };
+    }
+    return hatches[colour];
   };
 
   const shift = window.shift = {
