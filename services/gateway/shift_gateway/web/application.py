@@ -15,6 +15,7 @@ from shift_gateway.docs_page import ICON
 from shift_gateway.gateway import Gateway
 from shift_gateway.web.live_histories import LiveHistories
 from shift_gateway.web.room_page import add_room_page
+from shift_gateway.web.start_page import add_start_page
 
 ASSETS = Path(__file__).parent / "assets"
 RECONNECT_S = 10.0
@@ -26,6 +27,7 @@ def make_pages(gateway: Gateway) -> FastAPI:
     app = FastAPI(openapi_url=None)
     nicegui_app.add_static_files("/page-assets", ASSETS, max_cache_age=0)
     histories = LiveHistories(gateway)
+    add_start_page(gateway)
     add_room_page(gateway, histories)
     ui.run_with(
         app, title="SHIFT mesh", favicon=ICON, dark=None, language="en-US", tailwind=False, show_welcome_message=False,
