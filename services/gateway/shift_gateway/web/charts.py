@@ -91,3 +91,51 @@ def gaps(history: SessionHistory, first_ns: int, last_ns: int) -> list[list[int]
 def shortened(text: str, most: int = 24) -> str:
     """Return a label's text, cut at ``most`` characters."""
     return text if len(text) <= most else text[: most - 1] + "…"
+
+
+# --- the desk ---
+
+
+def bar_options(names: Sequence[str]) -> dict[str, Any]:
+    """Return the options of the bar chart of probabilities; the data come later."""
+    return {
+        "animation": False,
+        "aria": {"enabled": True, "decal": {"show": True}},
+        "grid": {"left": 8, "right": 40, "top": 6, "bottom": 6, "containLabel": True},
+        "xAxis": {"type": "value", "min": 0, "max": 1, "splitNumber": 2},
+        "yAxis": {"type": "category", "inverse": True, "data": list(names)},
+        "series": [{"type": "bar", "data": [0] * len(names), "label": {"show": True, "position": "right"}}],
+    }
+
+
+def heat_options(actions: Sequence[str], states: Sequence[str], cells: Sequence[Sequence[Any]]) -> dict[str, Any]:
+    """Return the options of a table of values as a heat map, from -1 to 1 (rewards are within -1..1)."""
+    return {
+        "animation": False,
+        "aria": {"enabled": True},
+        "grid": {"left": 8, "right": 8, "top": 8, "bottom": 60, "containLabel": True},
+        "xAxis": {"type": "category", "data": list(actions), "axisLabel": {"rotate": 20, "fontSize": 11}},
+        "yAxis": {"type": "category", "inverse": True, "data": list(states), "axisLabel": {"fontSize": 11}},
+        "visualMap": {
+            "min": -1, "max": 1, "calculable": False, "orient": "horizontal", "left": "center", "bottom": 0,
+            "itemHeight": 120, "text": ["1", "-1"], "inRange": {"color": ["#f2b46a", "#f7f7f7", "#86c3ec"]},
+        },
+        "series": [
+            {
+                "type": "heatmap", "data": [list(c) for c in cells],
+                "label": {"show": len(states) <= 12, "color": "#1b2733", "fontSize": 11},
+            }
+        ],
+    }  # fmt: skip
+
+
+def curve_options(name: str) -> dict[str, Any]:
+    """Return the options of a curve over the number of reports."""
+    return {
+        "animation": False,
+        "aria": {"enabled": True},
+        "grid": {"left": 8, "right": 16, "top": 26, "bottom": 24, "containLabel": True},
+        "xAxis": {"type": "value", "name": "report", "nameLocation": "middle", "nameGap": 22, "minInterval": 1},
+        "yAxis": {"type": "value", "name": name},
+        "series": [{"type": "line", "showSymbol": False, "data": [], "lineStyle": {"width": 2}}],
+    }

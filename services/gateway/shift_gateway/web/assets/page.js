@@ -91,6 +91,10 @@
       const text = old ? `Old values: last heard from the mesh at ${shift.lastText}. The page goes on by itself.` : '';
       if (banner.textContent !== text) banner.textContent = text;
     },
+    author(name) {
+      if (name !== undefined) localStorage.setItem('shift-author', name);
+      return localStorage.getItem('shift-author') || '';
+    },
     theme(next) {
       if (next) localStorage.setItem('shift-theme', next);
       return localStorage.getItem('shift-theme') || 'auto';
@@ -114,6 +118,9 @@
 
   document.addEventListener('DOMContentLoaded', () => {
     setInterval(shift.mark, 500);
+    setInterval(() => { // tables that scroll are reached by the keyboard
+      for (const e of document.querySelectorAll('.q-table__middle:not([tabindex]), .lines:not([tabindex])')) e.tabIndex = 0;
+    }, 500);
     new MutationObserver(retheme).observe(document.body, { attributes: true, attributeFilter: ['class'] });
     new MutationObserver((changes) => {
       if (changes.some((c) => [...c.addedNodes].some((n) => n.querySelector &&
