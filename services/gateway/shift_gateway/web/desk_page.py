@@ -51,7 +51,7 @@ class DeskPage:
     def __init__(self, gateway: Gateway, name: str, history: SessionHistory) -> None:
         self._history = history
         self._revision = -1
-        with ui.element("main").classes("page"):
+        with ui.element("div").classes("page"):
             with ui.element("div").classes("bar"):
                 text(f"Desk of session {name}", tag="h1")
                 ui.element("span").classes("grow")

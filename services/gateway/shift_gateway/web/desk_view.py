@@ -156,18 +156,19 @@ def changes(configs: Sequence[Config]) -> list[Change]:
         old, new = json.loads(before.study), json.loads(after.study)
         found.append(
             Change(
-                after.version, clock_time(after.stamp.ns), after.author, tuple(_differences(old, new)),
+                after.version, clock_time(after.stamp.ns), after.author, tuple(differences(old, new)),
                 merge_patch_between(new, old),
             )
         )  # fmt: skip
     return found[::-1]
 
 
-def _differences(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, str, str]]:
+def differences(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, str, str]]:
+    """Yield the path, the old and the new value of each difference between two studies as plain objects."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in {**old, **new}:
             if old.get(key) != new.get(key):
-                yield from _differences(old.get(key), new.get(key), f"{path}.{key}" if path else key)
+                yield from differences(old.get(key), new.get(key), f"{path}.{key}" if path else key)
     else:
         yield path, json.dumps(old), json.dumps(new)
 

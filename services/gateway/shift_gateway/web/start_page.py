@@ -91,7 +91,7 @@ class StartPage:
         self._checks: dict[str, ui.label] = {}
         self._studies: dict[str, StudyChoice] = {}
         self._blinded: set[str] = set()
-        with ui.element("main").classes("page"):
+        with ui.element("div").classes("page"):
             text("How should the robot phrase its next explanation for this person, now?", tag="h1")
             self._steps = _steps(origin)
             with ui.element("div").classes("columns"):
