@@ -21,7 +21,7 @@ from shift_gateway.web.desk_view import (
     words,
 )
 from shift_gateway.web.history import END_OF_TIME, SessionHistory
-from shift_gateway.web.layout import Frame, explain, testid, text
+from shift_gateway.web.layout import Frame, explain, redraw, testid, text
 from shift_gateway.web.live_histories import LiveHistories
 from shift_gateway.web.live_page import live_session_page
 from shift_gateway.web.steering_page import SteeringPanel
@@ -179,7 +179,7 @@ class DeskPanels:
         policy = self._history.policies.last(at_ns)
         if policy is not None and policy is not self._drawn:
             self._show_policy(policy)
-        self._curve.run_chart_method("setOption", {"series": [{"data": reward_curve(self._history, at_ns)}]})
+        redraw(self._curve, {"series": [{"data": reward_curve(self._history, at_ns)}]})
 
     def _show_decision(self, decision: Decision, study: Study) -> None:
         self._title.text = (
@@ -194,7 +194,7 @@ class DeskPanels:
                 text(contribution.text)
         chances = probabilities(decision.actions, decision.probabilities)
         self._texts["probabilities"].text = "; ".join(f"{name}: {p:.3f}" for name, p in chances)
-        self._bars.run_chart_method("setOption", {"series": [{"data": [round(p, 3) for _, p in chances]}]})
+        redraw(self._bars, {"series": [{"data": [round(p, 3) for _, p in chances]}]})
 
     def _show_policy(self, policy: Policy) -> None:
         self._drawn = policy
@@ -205,4 +205,4 @@ class DeskPanels:
         first = self._history.policies.items[0]
         for chart, shown in ((self._heat, policy), (self._prior, first)):
             axis = {"yAxis": {"data": list(shown.states)}, "series": [{"data": heat_map(shown)}]}
-            chart.run_chart_method("setOption", axis)
+            redraw(chart, axis)

@@ -19,7 +19,6 @@ from shift_gateway.web.recording_verification import WORK, VerifyResult
 from shift_gateway.web.recording_view import (
     LINKED,
     events,
-    explanation,
     recording_head,
     timeline_height,
     timeline_options,
@@ -156,7 +155,6 @@ class Player:
         self._controls()
         self._elements = RoomElements(study)
         self._room()
-        self._explanation()
         self._desk = DeskPanels(recording.history)
         self._events()
         self._timer = ui.timer(TICK_S, self._tick, active=False)
@@ -201,11 +199,6 @@ class Player:
             text("decision ", tag="span")
             self._elements.add_text("decision-number", tag="span")
             self._sources = GazeSources()
-
-    def _explanation(self) -> None:
-        with ui.element("section").classes("panel"):
-            text("Why the last decision was made", tag="h2")
-            self._why = ui.element("div")
 
     def _events(self) -> None:
         columns = [{"name": n, "label": n, "field": n, "align": "left"} for n in EVENT_COLUMNS]
@@ -259,16 +252,4 @@ class Player:
         self._sources.show(view.sources)
         self._desk.show_person(at_ns)
         self._desk.show(at_ns)
-        self._show_explanation(at_ns)
         ui.run_javascript(stimulus_script(view) + f"shift.cursor({self._chart.id}, {shown}, {LINKED})")
-
-    def _show_explanation(self, at_ns: int) -> None:
-        found = explanation(self._recording.history, at_ns)
-        self._why.clear()
-        with self._why:
-            for label, value in found.lines:
-                text(f"{label}: {value}")
-            for choice in found.choices:
-                marks = [m for m, is_so in (("chosen", choice.chosen), ("suggested", choice.suggested)) if is_so]
-                value = "" if choice.value is None else f", value {choice.value:.3f} ({choice.visits} visits)"
-                text(f"{choice.strategy}: p {choice.probability:.3f}{value} {', '.join(marks)}", "muted")

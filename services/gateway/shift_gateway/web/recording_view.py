@@ -1,4 +1,4 @@
-"""What the page of a recording shows: its time line, the table of its events, and why a decision was made. Pure."""
+"""What the page of a recording shows: its time line and the table of its events. Pure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shift_gateway.web.history import END_OF_TIME, SessionHistory
 from shift_gateway.web.recording_history import RecordingHistory
 from shift_gateway.web.recording_summary import is_blinded
 from shift_gateway.web.recordings_view import BLINDED
-from shift_gateway.web.wording import date_and_time, duration, levels, origin, reasons
+from shift_gateway.web.wording import date_and_time, duration, levels, origin
 
 MOST_POINTS = 3000
 """A curve has at most this many points; more would not be seen on a screen. Chosen."""
@@ -230,63 +230,6 @@ def _result_text(result: Any) -> str:
     corrected = ", corrects an earlier report" if result.corrects else ""
     reward = f"reward {result.reward:+.3f}, sum {result.cumulative_reward:+.3f}"
     return f"{result.task}: {', '.join(sides)}; {reward}{corrected}"
-
-
-# --- the decision under the cursor ---
-
-
-class Choice(NamedTuple):
-    """One action that the decision could have taken."""
-
-    strategy: str
-    probability: float
-    value: float | None
-    """The learner's value in the decision's state; None if the policy is not in the recording."""
-    visits: int | None
-    chosen: bool
-    suggested: bool
-
-
-class Explanation(NamedTuple):
-    """Why the last decision was made."""
-
-    lines: tuple[tuple[str, str], ...] = ()
-    """Label and value."""
-    choices: tuple[Choice, ...] = ()
-
-
-def explanation(history: SessionHistory, at_ns: int = END_OF_TIME) -> Explanation:
-    """Return why the last decision at a time was made; empty before the first decision."""
-    decision = history.decisions.last(at_ns)
-    if decision is None:
-        return Explanation()
-    policy = next((p for p in history.policies.until(at_ns) if p.version == decision.versions.policy), None)
-    row = policy.states.get(decision.state) if policy else None
-    result = history.performance_of(decision.decision_id, at_ns)
-    lines = (
-        ("observation", reasons(decision.observation)),
-        ("scores", ", ".join(f"{name} {score:.3f}" for name, score in decision.scores.items())),
-        ("state", decision.cognitive_state),
-        ("suggested by the scoring table", levels(decision.suggested)),
-        ("chosen", f"{levels(decision.strategy)} ({origin(decision)})"),
-        ("exploration rate", f"{policy.epsilon:.3f}" if policy and policy.epsilon is not None else "none"),
-        ("reward", f"{result.reward:+.3f}" if result else "no result yet"),
-        ("cumulative reward", f"{_cumulative(history, at_ns):+.3f}"),
-    )
-    choices = [
-        Choice(
-            levels(action), p, row.values[i] if row and i < len(row.values) else None,
-            row.visits[i] if row and i < len(row.visits) else None,
-            action == decision.strategy, action == decision.suggested,
-        )
-        for i, (action, p) in enumerate(zip(decision.actions, decision.probabilities, strict=False))
-    ]  # fmt: skip
-    return Explanation(lines, tuple(choices))
-
-
-def _cumulative(history: SessionHistory, at_ns: int) -> float:
-    last = history.performances.last(at_ns)
-    return last.cumulative_reward if last else 0.0
 
 
 def _entries(history: SessionHistory, name: str) -> list[tuple[int, Any]]:
