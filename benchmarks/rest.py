@@ -1,6 +1,8 @@
-"""The REST door beside a bare FastAPI hello, request by request in turn: medians and ratios with their spread.
+"""Compare REST requests with a minimal FastAPI application: medians, and ratios with their quartiles.
 
-``python benchmarks/rest.py``. Every request is a new one on the same kept-alive connection. Ratios hold, times drift.
+    python benchmarks/rest.py
+
+The requests take turns on connections that stay open. Compare ratios: times change with the load of the machine.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ uvicorn.run(app, port=int(sys.argv[1]), log_level="warning", access_log=False)
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the times of all requests."""
     port = free_port()
     bare = subprocess.Popen([sys.executable, "-c", BARE, str(port)])
     try:
