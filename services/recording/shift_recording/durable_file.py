@@ -117,3 +117,22 @@ def replace(temporary: Path, target: Path) -> None:
     with storage_errors(target):
         os.replace(temporary, target)
     sync_folder(target.parent)
+
+
+def write_durably(target: Path, data: bytes) -> None:
+    """Write a whole file: after this it has ``data``, also after a crash; before, it is as it was.
+
+    Raises
+    ------
+    StorageFailed
+        The disk refuses.
+    """
+    make_folder(target.parent)
+    temporary = target.with_name(f".{target.name}.partial")
+    file = DurableFile(temporary, new=False)
+    try:
+        file.write(data)
+        file.sync()
+    finally:
+        file.close()
+    replace(temporary, target)

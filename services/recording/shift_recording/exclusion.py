@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from shift_schemas.errors import DamagedRecording, UnknownThing
 from shift_schemas.timestamps import Stamp
 
-from shift_recording.durable_file import DurableFile, replace
+from shift_recording.durable_file import write_durably
 
 EXCLUSION_FORMAT = 1
 """The format of the file that this version writes."""
@@ -91,16 +91,5 @@ def add_entry(recording: Path, entry: ExclusionEntry) -> Exclusion:
     with _LOCK:
         before = read_exclusion(recording)
         after = before.model_copy(update={"entries": (*before.entries, entry)})
-        _write(exclusion_path(recording), after.model_dump_json(indent=2).encode() + b"\n")
+        write_durably(exclusion_path(recording), after.model_dump_json(indent=2).encode() + b"\n")
     return after
-
-
-def _write(target: Path, data: bytes) -> None:
-    temporary = target.with_name(f".{target.name}.partial")
-    file = DurableFile(temporary, new=False)
-    try:
-        file.write(data)
-        file.sync()
-    finally:
-        file.close()
-    replace(temporary, target)

@@ -71,6 +71,15 @@ def find_study(name: str, folder: Path) -> CheckedStudy | None:
     return _the_only(name, paths) if paths else None
 
 
+def study_text(name: str, folder: Path) -> str | None:
+    """Return the text of the study's file, or of the built-in study; ``None`` if no study has this name.
+
+    Raise :class:`InvalidStudy` if the file cannot be read as text.
+    """
+    paths = _by_name(folder).get(name)
+    return _text(paths[0][0]) if paths else None
+
+
 def study_names(folder: Path) -> tuple[str, ...]:
     """Return the names of all studies, sorted, without reading the files."""
     return tuple(sorted(_by_name(folder)))

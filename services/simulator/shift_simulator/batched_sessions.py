@@ -7,6 +7,7 @@ paper's simulation. A study with another window is refused.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,19 @@ class Trace:
         return np.cumsum(self.reward, axis=0)
 
 
-def simulate(user: User, study: Study, learner: BatchLearner, seeds: Ints, episodes: int, copies: int = 1) -> Trace:
+OnProgress = Callable[[int, int], None]
+"""Called now and then with how many steps of how many are done."""
+
+
+def simulate(
+    user: User,
+    study: Study,
+    learner: BatchLearner,
+    seeds: Ints,
+    episodes: int,
+    copies: int = 1,
+    on_progress: OnProgress | None = None,
+) -> Trace:
     """Simulate a session of ``episodes`` decisions for each seed, ``copies`` times side by side.
 
     Parameters
@@ -59,6 +72,8 @@ def simulate(user: User, study: Study, learner: BatchLearner, seeds: Ints, episo
         reward = persons.perform(episode, action)
         learner.learn(triple, action, reward)
         trace.triple[episode], trace.action[episode], trace.reward[episode] = triple, action, reward
+        if on_progress is not None:
+            on_progress(episode + 1, episodes)
     return trace
 
 

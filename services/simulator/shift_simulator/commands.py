@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.progress import Progress
 
 from shift_simulator.options import LEARNER_HELP, USER_HELP, USER_METAVAR, check_learner
 
@@ -40,8 +42,8 @@ def table2(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fa
     from shift_simulator import table2 as experiment
 
     _make_folder(out)
-    with _progress("twelve rows"):
-        result = experiment.table2(seed, runs)
+    with _steps("interactions") as on_progress:
+        result = experiment.table2(seed, runs, on_progress)
     _output("table2", result, out, as_json, report.print_table2)
     _exit_by_criterion(result)
 
@@ -57,8 +59,8 @@ def users(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fal
     from shift_simulator import report, user_study
 
     _make_folder(out)
-    with _progress("users A to D"):
-        result = user_study.users(seed, runs)
+    with _steps("users") as on_progress:
+        result = user_study.users(seed, runs, on_progress)
     if out is not None:
         user_study.draw_users(result, out)
     _output("users", result, out, as_json, report.print_users)
@@ -123,6 +125,18 @@ def _progress(text: str) -> Iterator[Callable[[str], None]]:
     """Show a spinner on standard error; yield the function that changes its text."""
     with Console(stderr=True).status(text) as status:
         yield status.update
+
+
+@contextmanager
+def _steps(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a progress bar on standard error; where that is no terminal, write a line such as ``3 of 12 users``."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield lambda done, total: print(f"{done} of {total} {what}", file=sys.stderr, flush=True)
+        return
+    with Progress(console=console, transient=True) as bar:
+        task = bar.add_task(what)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _output(

@@ -9,7 +9,7 @@ from shift_learner.learner import Context
 from shift_study.study import Study
 
 from shift_simulator.batched_learners import BatchQLearning
-from shift_simulator.batched_sessions import simulate
+from shift_simulator.batched_sessions import OnProgress, simulate
 from shift_simulator.criterion import table2_criterion
 from shift_simulator.random_streams import Floats, session_seeds
 from shift_simulator.users import paper_user
@@ -50,17 +50,17 @@ PAPER: tuple[Setting, ...] = (
 MEASURES = ("z_mean", "z_sd", "r_mean", "r_sd")
 
 
-def table2(seed: int, runs: int = RUNS) -> dict[str, Any]:
+def table2(seed: int, runs: int = RUNS, on_progress: OnProgress | None = None) -> dict[str, Any]:
     """Return the twelve rows, the paper's values, and the verdict on the criterion (docs/interface.md, "Command line").
 
     All rows use the same ``runs`` simulated sessions, so they differ only by their settings.
     """
-    cumulative = _cumulative(seed, runs)
+    cumulative = _cumulative(seed, runs, on_progress)
     rows = [_row(setting, cumulative[:, i * runs : (i + 1) * runs]) for i, setting in enumerate(PAPER)]
     return {"seed": seed, "runs": runs, "rows": rows, "criterion": table2_criterion(rows)}
 
 
-def _cumulative(seed: int, runs: int) -> Floats:
+def _cumulative(seed: int, runs: int, on_progress: OnProgress | None) -> Floats:
     """Return the cumulative reward of all rows side by side, float [episodes, 12 x runs]."""
     study = Study(study="table2")
     prior = np.repeat([study.learner.prior_value * s.prior for s in PAPER], runs)
@@ -68,7 +68,7 @@ def _cumulative(seed: int, runs: int) -> Floats:
     discount = np.repeat([s.discount for s in PAPER], runs)
     learner = BatchQLearning(Context(study), prior, rate, discount)
     seeds = session_seeds(seed, runs)
-    return simulate(paper_user("A"), study, learner, seeds, EPISODES, len(PAPER)).cumulative
+    return simulate(paper_user("A"), study, learner, seeds, EPISODES, len(PAPER), on_progress).cumulative
 
 
 def _row(setting: Setting, cumulative: Floats) -> dict[str, Any]:

@@ -10,21 +10,23 @@ from shift_learner.learner import Context
 from shift_study.study import Study
 
 from shift_simulator.batched_learners import BatchQLearning
-from shift_simulator.batched_sessions import simulate
+from shift_simulator.batched_sessions import OnProgress, simulate
 from shift_simulator.criterion import users_criterion
 from shift_simulator.random_streams import Floats, session_seeds
 from shift_simulator.table2 import EPISODES, RUNS
 from shift_simulator.users import PAPER_USERS, paper_user
 
 
-def users(seed: int, runs: int = RUNS) -> dict[str, Any]:
+def users(seed: int, runs: int = RUNS, on_progress: OnProgress | None = None) -> dict[str, Any]:
     """Return the break-even and reward of each user with and without the prior, the curves and the criterion.
 
     ``curves`` holds the data of the figure for each user and prior: the mean cumulative reward after each episode,
     and the band between the 10th and 90th percentile of the runs.
     """
     rows, curves = [], []
-    for name in PAPER_USERS:
+    for done, name in enumerate(PAPER_USERS):
+        if on_progress is not None:
+            on_progress(done, len(PAPER_USERS))
         for prior, cumulative in _curves(name, seed, runs).items():
             rows.append({"user": name, "prior": prior} | _summary(cumulative))
             curves.append({"user": name, "prior": prior} | _curve(cumulative))

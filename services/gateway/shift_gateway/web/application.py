@@ -14,11 +14,13 @@ from nicegui import ui
 from shift_gateway.docs_page import ICON
 from shift_gateway.gateway import Gateway
 from shift_gateway.web.desk_page import add_desk_page
+from shift_gateway.web.evaluation_page import add_evaluation_page
 from shift_gateway.web.live_histories import LiveHistories
 from shift_gateway.web.recording_page import add_recording_page
 from shift_gateway.web.recordings_page import add_recordings_page
 from shift_gateway.web.room_page import add_room_page
 from shift_gateway.web.start_page import add_start_page
+from shift_gateway.web.study_page import add_study_page
 
 ASSETS = Path(__file__).parent / "assets"
 RECONNECT_S = 10.0
@@ -35,6 +37,8 @@ def make_pages(gateway: Gateway) -> FastAPI:
     add_desk_page(gateway, histories)
     add_recordings_page(gateway)
     add_recording_page(gateway)
+    add_study_page(gateway)
+    add_evaluation_page()
     ui.run_with(
         app, title="SHIFT mesh", favicon=ICON, dark=None, language="en-US", tailwind=False, show_welcome_message=False,
         reconnect_timeout=RECONNECT_S, gzip_middleware_factory=None, binding_refresh_interval=None,

@@ -91,6 +91,12 @@
       const text = old ? `Old values: last heard from the mesh at ${shift.lastText}. The page goes on by itself.` : '';
       if (banner.textContent !== text) banner.textContent = text;
     },
+    jump(id, line) { // put the editor's cursor into a line
+      const editor = getElement(id).editor;
+      if (!editor || line > editor.state.doc.lines) return;
+      editor.dispatch({ selection: { anchor: editor.state.doc.line(line).from }, scrollIntoView: true });
+      editor.focus();
+    },
     position(s) { // a position on a recording's time line, minutes and seconds
       const whole = Math.max(0, Math.floor(s)), pad = (n) => String(n).padStart(2, '0');
       const h = Math.floor(whole / 3600), m = Math.floor(whole / 60) % 60;
