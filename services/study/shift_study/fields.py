@@ -21,7 +21,8 @@ Level = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
 Point = Annotated[list[Probability], Field(min_length=2, max_length=2)]
 
 
-StimulusFile = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_. -]{0,100}\.(png|jpg|jpeg|svg|webp|PNG|JPG)$")]
+STIMULUS_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9_. -]{0,100}\.(png|jpg|jpeg|svg|webp|PNG|JPG)$"
+StimulusFile = Annotated[str, Field(pattern=STIMULUS_PATTERN)]
 """The name of an image file, without a folder."""
 
 

@@ -13,7 +13,9 @@ from starlette.types import Message, Receive, Scope, Send
 if TYPE_CHECKING:
     from shift_gateway.gateway import Gateway
 
-PAGES = ("/session", "/recordings", "/study", "/evaluation", "/page-assets", "/_nicegui", "/_nicegui_ws")
+PAGES = (
+    "/session", "/recordings", "/study", "/evaluation", "/page-assets", "/page-stimulus", "/_nicegui", "/_nicegui_ws",
+)  # fmt: skip
 """The first parts of the paths that the page has, besides ``/`` itself."""
 POLICY = (
     b"content-security-policy",

@@ -39,6 +39,7 @@ class Frame:
         ui.page_title(f"{title} - SHIFT mesh")
         ui.add_head_html(HEAD)
         self.dark = ui.dark_mode(None)
+        self._shortcuts: ui.checkbox | None = None
         ui.label().classes("old-values").props('role="status" aria-live="polite"')
         if links:
             with ui.element("nav").classes("bar").style("padding: .6rem 1rem"):
@@ -47,16 +48,25 @@ class Frame:
                 ui.link("Evaluation", "/evaluation")
                 ui.link("REST paths", "/docs")
                 ui.element("span").classes("grow")
+                self._shortcuts = ui.checkbox("shortcuts", value=True, on_change=self._set_shortcuts)
+                explain(self._shortcuts, "Single keys in the room view: m marker, o override, e end.")
                 self.theme_button()
-        ui.timer(0.05, self._restore_theme, once=True)
+        ui.timer(0.05, self._restore, once=True)
 
     def theme_button(self) -> ui.button:
         """Show the button that changes between the system's colours, light and dark."""
         self._button = ui.button("colours: auto", on_click=self._next_theme).props("flat dense")
         return self._button
 
-    async def _restore_theme(self) -> None:
+    async def _restore(self) -> None:
+        """Show what this browser chose before."""
         await self._set(await ui.run_javascript("shift.theme()"))
+        if self._shortcuts is not None:
+            self._shortcuts.value = bool(await ui.run_javascript("shift.shortcuts()"))
+
+    def _set_shortcuts(self) -> None:
+        assert self._shortcuts is not None
+        ui.run_javascript(f"shift.shortcuts({'true' if self._shortcuts.value else 'false'})")
 
     async def _next_theme(self) -> None:
         names = list(THEMES)

@@ -12,6 +12,8 @@ from shift_gateway.web.gaze_quality import SourceQuality
 from shift_gateway.web.layout import explain, testid, text
 from shift_gateway.web.room_view import RoomView
 
+STIMULUS_PATH = "/page-stimulus"
+"""Where the browser finds the images of studies."""
 LONG_SAY = 40
 """A longer text is shown a little smaller, so that it fits; characters."""
 TOOLTIPS = {
@@ -136,11 +138,18 @@ def _toggled(name: str, wanted: bool) -> dict[str, str]:
 
 def stimulus_svg(study: Study) -> str:
     """Return the stimulus as SVG with its AOIs. Their names are ids, so that nothing in them is markup."""
-    shapes = "".join(_shape(aoi) for aoi in study.aois)
+    shapes = _image(study) + "".join(_shape(aoi) for aoi in study.aois)
     return (
         f'<svg viewBox="0 0 100 60" preserveAspectRatio="xMidYMid meet" role="img" aria-label="Areas of interest: '
         f'{", ".join(study.aoi_names)}"><rect class="aoi" x="0" y="0" width="100" height="60"/>{shapes}</svg>'
     )
+
+
+def _image(study: Study) -> str:
+    """Return the stimulus image under the AOIs; a file's name has no character that is markup."""
+    if study.stimulus is None:
+        return ""
+    return f'<image href="{STIMULUS_PATH}/{study.stimulus}" width="100" height="60" preserveAspectRatio="none"/>'
 
 
 def _shape(aoi: Aoi) -> str:

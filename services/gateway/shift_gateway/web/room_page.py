@@ -103,7 +103,7 @@ class RoomPage:
             choice = ui.select(settings.levels, label=strategy, value=settings.levels[0])
             choice.props("dense outlined options-dense").style("min-width: 8rem")
             self._levels[strategy] = testid(choice, f"override-{strategy}")
-        button = testid(ui.button("Override", on_click=self._override).props("outline"), "override")
+        button = testid(ui.button("Override [o]", on_click=self._override).props("outline data-shortcut=o"), "override")
         explain(button, "The strategy of the task's next decision, instead of the learner's choice.")
 
     # --- what a click does ---

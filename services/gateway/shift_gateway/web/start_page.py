@@ -149,6 +149,8 @@ class StartPage:
         self._condition.set_enabled(bool(conditions))
         self._remarks.clear()
         with self._remarks:
+            if choice is not None:
+                ui.link("Show this study", f"/study/{choice.name}")
             for sentence in choice.remarks if choice else ():
                 text(sentence, "" if choice and choice.startable else "warning")
 

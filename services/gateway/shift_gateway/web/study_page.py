@@ -65,6 +65,7 @@ class StudyPage:
             with ui.element("div").classes("columns even"):
                 self._shown()
                 self._editing(found)
+            self._all_triples()
 
     # --- the elements ---
 
@@ -78,11 +79,6 @@ class StudyPage:
             with ui.element("section").classes("panel"):
                 text("Scoring table (paper, Table I)", tag="h2")
                 self._table = testid(ui.table(rows=[], row_key="category").props("flat dense"), "study-table")
-            with ui.element("section").classes("panel"):
-                text("The 30 triples: capacity / gaze / awareness", tag="h2")
-                columns = [{"name": n, "label": n, "field": n, "align": "left"} for n in COLUMNS]
-                self._triples = ui.table(rows=[], columns=columns, row_key="triple").props("flat dense wrap-cells")
-                testid(self._triples, "study-triples")
 
     def _editing(self, found: str) -> None:
         with ui.element("section").classes("panel form"):
@@ -97,6 +93,13 @@ class StudyPage:
                 self._replace = ui.checkbox("replace an existing file")
                 explain(self._replace, "Sessions that run keep the study that they began with.")
                 testid(ui.button("Save", on_click=self._save).props("outline"), "study-save")
+
+    def _all_triples(self) -> None:
+        with ui.element("section").classes("panel"):
+            text("The 30 triples: capacity / gaze / awareness", tag="h2")
+            columns = [{"name": n, "label": n, "field": n, "align": "left"} for n in COLUMNS]
+            self._triples = ui.table(rows=[], columns=columns, row_key="triple").props("flat dense")
+            testid(self._triples.classes("sessions"), "study-triples")
 
     # --- the text ---
 

@@ -43,7 +43,8 @@
             ...mark(s.decisions, 'decision'), ...mark(s.markers, 'marker')] },
           markArea: { silent: true, itemStyle: { color: hatch(c.gap) }, data: s.gaps.map(([a, b]) => [{ xAxis: a }, { xAxis: b }]) } },
         { data: s.points.map((p) => [p[0], p[2]]) },
-        { data: s.points.filter((p) => p[3]).map((p) => [p[0], p[3]]), itemStyle: { color: c.series[0] } },
+        { data: s.points.filter((p) => p[3]).map((p) => [p[0], p[3]]), itemStyle: { color: c.series[0] },
+          symbolSize: [Math.max(3, Math.ceil(500 * (chart.getWidth() - 102) / s.windowMs)), 14] },
       ] });
   };
 
@@ -143,7 +144,8 @@
   document.addEventListener('DOMContentLoaded', () => {
     setInterval(shift.mark, 500);
     setInterval(() => { // tables that scroll are reached by the keyboard
-      for (const e of document.querySelectorAll('.q-table__middle:not([tabindex]), .lines:not([tabindex])')) e.tabIndex = 0;
+      for (const e of document.querySelectorAll('.q-table__middle:not([tabindex]), .lines:not([tabindex]), .cm-scroller:not([tabindex="0"])')) e.tabIndex = 0;
+      for (const e of document.querySelectorAll('.cm-content:not([aria-label])')) e.setAttribute('aria-label', 'Text of the study file');
     }, 500);
     new MutationObserver(retheme).observe(document.body, { attributes: true, attributeFilter: ['class'] });
     new MutationObserver((changes) => {
