@@ -69,7 +69,7 @@ def _table2_figure(result: dict[str, Any]) -> dict[str, Any]:
         "legend": {"top": 0},
         "grid": {"left": 8, "right": 8, "top": 30, "bottom": 24, "containLabel": True},
         "xAxis": {"type": "category", "data": [f"row {r['row']}" for r in rows]},
-        "yAxis": {"type": "value", "name": "reward after 100"},
+        "yAxis": {"type": "value", "name": "R"},
         "series": series,
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 from nicegui import ui
 from shift_study.areas import Aoi
@@ -30,6 +31,8 @@ class RoomElements:
     def __init__(self, study: Study) -> None:
         self._study = study
         self._texts: dict[str, ui.label] = {}
+        self._shown_state = ""
+        self._state_parts: list[ui.element] = []
 
     def add_text(self, name: str, classes: str = "", tag: str = "div") -> ui.label:
         """Draw one value by its ``data-testid``."""
@@ -52,7 +55,8 @@ class RoomElements:
         """Draw the cognitive state."""
         with ui.element("section").classes("panel live").props('aria-label="Cognitive state"'):
             text("STATE", "caption")
-            explain(self.add_text("cognitive-state", "state"), TOOLTIPS["state"])
+            self._state = testid(ui.element("div").classes("state"), "cognitive-state")
+            explain(self._state, TOOLTIPS["state"])
             self.add_text("why", "why")
             self._changed = text("", "why muted")
 
@@ -84,18 +88,29 @@ class RoomElements:
         """Fill all panels."""
         values = {
             "decision-number": view.decision_number, "say": view.say, "strategy": view.strategy,
-            "result-pending": view.result_pending, "cognitive-state": view.cognitive_state, "why": view.why,
+            "result-pending": view.result_pending, "why": view.why,
             "capacity": view.capacity, "capacity-class": view.capacity_class, "gaze-class": view.gaze_class,
             **{f"weight-{aoi}": view.weights.get(aoi, "") for aoi in self._study.aoi_names},
         }  # fmt: skip
         for name, value in values.items():
             if name in self._texts:
                 self._texts[name].text = value
+        self._show_state(view.cognitive_state)
         self._origin.text = view.origin
         self._changed.text = f"now: {view.changed_to}" if view.changed_to else ""
         self._texts["say"].classes(**_toggled("long", len(view.say) > LONG_SAY))
         self._bar.style(f"width: {100 * min(max(view.capacity_share, 0), 1):.0f}%")
         self._threshold.style(f"left: {100 * view.threshold_share:.0f}%")
+
+    def _show_state(self, state: str) -> None:
+        """Show the state's name, which may be broken after an underscore."""
+        if state != self._shown_state:
+            self._shown_state = state
+            for part in self._state_parts:
+                part.delete()
+            with self._state:
+                words = re.split("(?<=_)", state)
+                self._state_parts = [part for word in words for part in (text(word, tag="span"), ui.element("wbr"))]
 
 
 class GazeSources:
