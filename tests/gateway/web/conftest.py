@@ -15,9 +15,9 @@ from support.whole_mesh import LiveMesh, running_mesh
 OpenTab = Callable[..., AbstractContextManager[Tab]]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """The browser of all tests."""
+    """A browser of the module's own: while it runs, its driver occupies the event loop of this thread."""
     with chromium() as found:
         yield found
 

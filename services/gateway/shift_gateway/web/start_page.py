@@ -111,11 +111,10 @@ class StartPage:
             testid(self._study, "start-study")
             self._condition = ui.select([], label="Condition").props("outlined dense options-dense")
             explain(testid(self._condition, "start-condition"), "The condition that this participant is in.")
-            with ui.expansion("More").classes("more"):
-                seed = ui.input("Seed (empty: made from the session’s id)").props("outlined dense")
-                self._seed = testid(seed, "start-seed")
-                session = ui.input("Session id (empty: a new one)").props("outlined dense")
-                self._session = testid(session, "start-session")
+            seed = ui.input("Seed (empty: made from the session’s id)").props("outlined dense")
+            self._seed = testid(seed, "start-seed")
+            session = ui.input("Session id (empty: a new one)").props("outlined dense")
+            self._session = testid(session, "start-session")
             self._remarks = ui.element("div").classes("muted")
             testid(ui.button("Start", on_click=self._start).props("outline"), "start")
 
