@@ -22,7 +22,7 @@ def test_a_million_bad_messages_are_one_text_a_second() -> None:
     diagnostics = Diagnostics(1.0)
     texts = []
     for i in range(100_000):
-        diagnostics.lost("gaze", ERROR)
+        diagnostics.count_lost("gaze", ERROR)
         text = diagnostics.report(i / 20_000)
         texts += [text] if text else []
     assert len(texts) == 5
@@ -32,9 +32,9 @@ def test_a_million_bad_messages_are_one_text_a_second() -> None:
 
 def test_it_says_what_was_wrong_and_where() -> None:
     diagnostics = Diagnostics(1.0)
-    diagnostics.came("gaze", 3)
-    diagnostics.lost("gaze", ERROR, 2, "overload")
-    diagnostics.now("ready")
+    diagnostics.count_received("gaze", 3)
+    diagnostics.count_lost("gaze", ERROR, 2, "overload")
+    diagnostics.set_state("ready")
     found = said(diagnostics.report(0.0, node="shift", session="s1"))
     assert found["state"] == "ready"
     assert found["received"] == {"gaze": 3}
@@ -46,17 +46,17 @@ def test_it_says_what_was_wrong_and_where() -> None:
 def test_a_new_state_is_news() -> None:
     diagnostics = Diagnostics(1.0)
     assert said(diagnostics.report(0.0))["state"] == "starting"
-    diagnostics.now("ready")
+    diagnostics.set_state("ready")
     assert diagnostics.report(0.5) is None
     assert said(diagnostics.report(1.0))["state"] == "ready"
-    diagnostics.now("ready")
+    diagnostics.set_state("ready")
     assert diagnostics.report(5.0) is None
 
 
 def test_names_of_others_do_not_fill_the_memory() -> None:
     diagnostics = Diagnostics(1.0)
     for i in range(1000):
-        diagnostics.lost(f"topic{i}", ERROR)
+        diagnostics.count_lost(f"topic{i}", ERROR)
     assert len(diagnostics.dropped) == TOPICS + 1
     assert sum(diagnostics.dropped.values()) == 1000
 

@@ -1,6 +1,6 @@
-"""The entry point's rules: each option has its environment variable, each error is a sentence with an exit code.
+"""The rules of the entry point: each option has an environment variable, each error is a sentence with an exit code.
 
-Exit codes: 0 fine, 1 what was checked is not so, 2 wrong use or it could not be done, 130 after Ctrl-C.
+Exit codes: 0 success, 1 a check failed, 2 wrong use or the command could not be carried out, 130 after Ctrl-C.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def run(app: typer.Typer) -> NoReturn:
 
 
 def outcome(app: typer.Typer, arguments: Sequence[str]) -> int:
-    """Carry out one command line; return the exit code. An error is said on standard error."""
+    """Carry out one command line and return the exit code. An error is written to standard error."""
     try:
         command_line(app)(args=list(arguments), prog_name="shift-mesh")
     except SystemExit as e:
@@ -38,14 +38,14 @@ def outcome(app: typer.Typer, arguments: Sequence[str]) -> int:
     except KeyboardInterrupt:
         return INTERRUPTED
     except ShiftError as e:
-        return _said(e)
+        return _report(e)
     except ValidationError as e:
-        return _said(malformed(e.title, e))
+        return _report(malformed(e.title, e))
     except OSError as e:
         where = f"{shorten(e.filename)}: " if e.filename else ""
-        return _sentence(f"{where}{e.strerror or e}")
+        return _write_error(f"{where}{e.strerror or e}")
     except Exception as e:
-        return _mistake_of_ours(e)
+        return _report_bug(e)
     return 0
 
 
@@ -74,21 +74,21 @@ def _flag(option: Any) -> str:
     return next((name for name in option.opts if name.startswith("--")), "")
 
 
-def _said(error: ShiftError) -> int:
-    """Say the detail, and each wrong field that it does not name."""
+def _report(error: ShiftError) -> int:
+    """Write the detail, and each wrong field that it does not name."""
     further = [f"  {f.field}: {f.rule}" for f in error.errors if f.field not in error.detail]
-    return _sentence("\n".join([error.detail, *further]))
+    return _write_error("\n".join([error.detail, *further]))
 
 
-def _mistake_of_ours(error: Exception) -> int:
+def _report_bug(error: Exception) -> int:
     if os.environ.get("SHIFT_DEBUG"):
         traceback.print_exc()
-    return _sentence(
+    return _write_error(
         f"something went wrong inside ({type(error).__name__}: {shorten(str(error))}). This is a mistake in "
         "shift-mesh: please report it, with what SHIFT_DEBUG=1 shows"
     )
 
 
-def _sentence(text: str) -> int:
+def _write_error(text: str) -> int:
     sys.stderr.write(f"shift-mesh: {text}\n")
     return WRONG

@@ -1,4 +1,4 @@
-"""``shift-mesh study``: check a study file, show a study with every default, list the studies there are. No mesh."""
+"""``shift-mesh study``: check a study file, show a study with every default, list the studies. It needs no mesh."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def check(
     ],
     as_json: Json = False,
 ) -> None:
-    """Read a study file as a start would, and say what is wrong or doubtful in it.
+    """Check a study file as a start would, and print its mistakes and warnings.
 
     Exit code 0: sessions can be started with it, also with warnings; 1: it has mistakes.
 
@@ -40,7 +40,7 @@ def check(
     if as_json:
         _print_json({"file": str(file), "study": found.study.study if found.study else None, **_summary(found)})
     else:
-        _say(found)
+        _print_findings(found)
     raise typer.Exit(1 if found.mistakes else 0)
 
 
@@ -117,7 +117,7 @@ def _print_json(document: Any) -> None:
     typer.echo(json.dumps(document, ensure_ascii=False))
 
 
-def _say(found: CheckedStudy) -> None:
+def _print_findings(found: CheckedStudy) -> None:
     for sentence in found.mistakes:
         typer.echo(sentence)
     for sentence in found.warnings:

@@ -1,8 +1,8 @@
-"""The supervisor of ``shift-mesh up``: every service its own process, restarted when it dies.
+"""The supervisor of ``shift-mesh up``: it runs every service as a process and restarts a process that ends.
 
-It imports everything once and forks, so that seven Python processes start in the time of one and come
-back at once after a crash. So it must itself never open a Zenoh session or start a thread. On a stop
-the doors go first, then the recorder, which finishes its files while the others still answer.
+The supervisor imports everything once and then forks, so that seven Python processes start in the time of one and
+restart at once after a crash. Therefore it must never open a Zenoh session or start a thread. At a stop, the gateway
+ends first and then the recorder, which finishes its files while the other services still answer.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ _STOPS = {signal.SIGINT, signal.SIGTERM}
 _SIGNALS = {*_STOPS, signal.SIGCHLD}
 POLL_S = 0.1
 GRACE_S = 12.0
-"""How long a service may take to stop; the recorder finishes files in it."""
+"""How long a service may take to stop, seconds; the recorder finishes its files in this time."""
 STEADY_S = 3.0
 """A process that ran this many seconds has its back-off reset."""
 LONGEST_PAUSE_S = 2.0
-"""Before the next try; with the start itself below the 5 s of RELIABILITY.md, row 3."""
+"""The longest pause before a restart, seconds; with the start itself below 5 s (docs/reliability.md)."""
 SETTINGS_WRONG = 2
 OWNED_ELSEWHERE = 3
-"""As ``shift_runtime.process`` ends (it is not imported here: this process must open no Zenoh session)."""
+"""The exit code of ``shift_runtime.process``, which is not imported: this process must not open a Zenoh session."""
 
 
 @dataclass
 class Program:
-    """A process of the mesh: its package and when it is told to stop (lower goes first)."""
+    """A process of the mesh: its package, and its place in the order of stopping (lower stops first)."""
 
     name: str
     module: str
@@ -45,13 +45,13 @@ class Program:
     started: float = 0.0
     deaths: int = 0
     due: float = 0.0
-    """When it is to be started again, on the monotonic clock."""
+    """When it is started again, on the monotonic clock, seconds."""
     ran: bool = False
-    """It lived for a while once, so its settings do: what ends it now may pass (a full disk, say)."""
+    """Whether it ran for a while: then its settings are valid, and a later end is restarted, as after a full disk."""
 
 
 def programs(demo: bool, router: bool) -> list[Program]:
-    """The processes of the mesh in the order of their start."""
+    """Return the processes of the mesh in the order of their start."""
     mesh = [
         Program("router", "shift_runtime.router", 5),
         Program("recorder", "shift_recorder", 3),
@@ -67,7 +67,7 @@ def programs(demo: bool, router: bool) -> list[Program]:
 
 @dataclass
 class Supervisor:
-    """Runs ``programs`` until a signal. ``tell`` says what happens, ``tick`` is called ten times a second."""
+    """Runs ``programs`` until a signal. ``tell`` gets each event as a sentence; ``tick`` runs ten times a second."""
 
     programs: Sequence[Program]
     tell: Callable[[str], None]
@@ -75,7 +75,7 @@ class Supervisor:
     _entries: dict[str, Callable[[], None]] = field(default_factory=dict)
 
     def run(self) -> int:
-        """Start everything, keep it running, stop it on SIGINT or SIGTERM; the exit code."""
+        """Start every program, keep it running, and stop it on SIGINT or SIGTERM. Return the exit code."""
         for program in self.programs:
             self._entries[program.name] = _entry(program.module)
         gc.collect()
@@ -93,11 +93,11 @@ class Supervisor:
     def _watch(self) -> int:
         while True:
             received = signal.sigtimedwait(_SIGNALS, POLL_S)
-            # After Ctrl-Z and fg it gives back a number that is no signal: CPython's loop around EINTR.
+            # After Ctrl-Z and fg, CPython's loop around EINTR returns a number that is not a signal.
             if received is not None and received.si_signo in _STOPS:
                 self.tell(f"{signal.Signals(received.si_signo).name}: stopping")
                 return 0
-            for program, status in self._dead():
+            for program, status in self._collect_ended():
                 program.ran = program.ran or time.monotonic() - program.started > STEADY_S
                 if os.waitstatus_to_exitcode(status) == OWNED_ELSEWHERE:
                     self.tell(f"the {program.name} found another mesh on its router; stopping")
@@ -105,14 +105,14 @@ class Supervisor:
                 if os.waitstatus_to_exitcode(status) == SETTINGS_WRONG and not program.ran:
                     self.tell(f"the {program.name} cannot run with these settings; stopping")
                     return SETTINGS_WRONG
-                self._mourn(program, status)
+                self._schedule_restart(program, status)
             now = time.monotonic()
             for program in self.programs:
                 if program.pid is None and now >= program.due:
                     self._start(program)
             self.tick()
 
-    def _dead(self) -> list[tuple[Program, int]]:
+    def _collect_ended(self) -> list[tuple[Program, int]]:
         found = []
         for program in self.programs:
             if program.pid is not None:
@@ -122,7 +122,7 @@ class Supervisor:
                     found.append((program, status))
         return found
 
-    def _mourn(self, program: Program, status: int) -> None:
+    def _schedule_restart(self, program: Program, status: int) -> None:
         now = time.monotonic()
         program.deaths = 0 if now - program.started > STEADY_S else program.deaths + 1
         pause = min(LONGEST_PAUSE_S, 0.1 * 2**program.deaths) if program.deaths else 0.0
@@ -136,15 +136,15 @@ class Supervisor:
         sys.stderr.flush()
         pid = os.fork()
         if pid == 0:
-            self._become(program)
+            self._run_child(program)
         program.pid = pid
         program.started = time.monotonic()
 
-    def _become(self, program: Program) -> None:
-        """In the child: be the service, and never come back."""
+    def _run_child(self, program: Program) -> None:
+        """Run the service in the child process. This never returns."""
         code = 1
         try:
-            os.setpgid(0, 0)  # Ctrl-C is the supervisor's; it stops the services in their order
+            os.setpgid(0, 0)  # Ctrl-C reaches the supervisor alone, which stops the services in their order
             ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
             signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
             setproctitle.setproctitle(f"python -m {program.module}")
@@ -171,7 +171,7 @@ class Supervisor:
 
     def _reap(self, wave: list[Program], deadline: float) -> None:
         while any(p.pid is not None for p in wave):
-            self._dead()
+            self._collect_ended()
             if time.monotonic() > deadline:
                 for program in wave:
                     self.tell(f"the {program.name} does not stop; it is killed")
@@ -189,7 +189,7 @@ def _signal(program: Program, number: signal.Signals) -> None:
 
 
 def _entry(module: str) -> Callable[[], None]:
-    """The module's ``main``, imported now so that every fork has it."""
+    """Return the module's ``main``. It is imported now, so that every fork has it."""
     name = module if module == "shift_runtime.router" else f"{module}.__main__"
     entry: Callable[[], None] = importlib.import_module(name).main
     return entry

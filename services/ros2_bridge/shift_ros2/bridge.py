@@ -78,7 +78,7 @@ class Bridge:
 
     def on_text(self, topic: str, text: str) -> None:
         """Handle a message. Raise :class:`ShiftError`."""
-        self.diagnostics.came(topic)
+        self.diagnostics.count_received(topic)
         match topic:
             case "gaze":
                 self._forward_gaze(mapping.gaze_of(text, self.settings.source, self.clock.now().ns / 1e9))
@@ -92,7 +92,7 @@ class Bridge:
 
     async def on_request(self, request_id: str | None) -> Answer:
         """Return the answer of the service: the next strategy, or why there is none."""
-        self.diagnostics.came("next_strategy")
+        self.diagnostics.count_received("next_strategy")
         try:
             answer = await self._decide(request_id)
         except ShiftError as e:
@@ -115,7 +115,7 @@ class Bridge:
 
     def on_lost(self, topic: str, error: ShiftError, count: int = 1, reason: str = "") -> None:
         """Count lost messages; the next diagnostics report them."""
-        self.diagnostics.lost(topic, error, count, reason)
+        self.diagnostics.count_lost(topic, error, count, reason)
         self.metrics.dropped(reason or ("malformed" if isinstance(error, MalformedMessage) else "refused"), count)
 
     def _gaze_lost(self, topic: str, error: ShiftError, count: int) -> None:
@@ -178,18 +178,20 @@ class Bridge:
                 await self._attach(self.session)
                 self._bound = self.session in self._attached
                 if not self._bound:
-                    self.diagnostics.now(f"waits: for the {', the '.join(self.mesh.read_model.missing)}")
+                    self.diagnostics.set_state(f"waits: for the {', the '.join(self.mesh.read_model.missing)}")
             except UnknownThing:
                 await self._start_session()
             except ShiftError as e:
-                self.diagnostics.now(f"waits: {e.detail}")
+                self.diagnostics.set_state(f"waits: {e.detail}")
             if not self._bound:
                 await asyncio.sleep(BIND_EVERY_S if not self.settings.create_session else 0.2)
 
     async def _start_session(self) -> None:
         settings = self.settings
         if not settings.create_session:
-            self.diagnostics.now(f"waits: there is no session {self.session}; begin it, or set create_session:=true")
+            self.diagnostics.set_state(
+                f"waits: there is no session {self.session}; begin it, or set create_session:=true"
+            )
             return
         body = StartBody(
             participant=settings.participant, session=self.session, study=settings.study,
@@ -199,7 +201,7 @@ class Bridge:
             await self.mesh.start(body)
             log.info("session begun", session=self.session, study=settings.study)
         except ShiftError as e:
-            self.diagnostics.now(f"waits: session {self.session} cannot begin: {e.detail}")
+            self.diagnostics.set_state(f"waits: session {self.session} cannot begin: {e.detail}")
 
     async def _attach(self, session: str) -> None:
         """Publish the facts of a session from now on. Raise :class:`UnknownThing` if it does not exist."""
@@ -227,7 +229,7 @@ class Bridge:
         """Publish the diagnostics if something changed and enough time has passed."""
         waits = self.backend.state
         if self._bound:
-            self.diagnostics.now(f"waits: {waits}" if waits else "ready")
+            self.diagnostics.set_state(f"waits: {waits}" if waits else "ready")
         where = {"node": self.settings.node, "session": self.session, "backend": self.settings.backend}
         text = self.diagnostics.report(time.monotonic(), **where)
         if text is not None:

@@ -1,7 +1,7 @@
-"""CDR of the few ROS messages that pass this door. Pure.
+"""CDR of the few ROS messages that the bridge reads and writes. Pure.
 
-Little-endian classic CDR: four bytes of header, then the fields, each aligned to its own size from the
-end of the header. What is read is read by length, never to the buffer's end: padding is seen there.
+The format is classic little-endian CDR: a header of four bytes and then the fields, each aligned to its own size from
+the end of the header. Fields are read by their length and never to the end of the buffer, since padding can follow.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ from shift_schemas.errors import MalformedMessage, shorten
 
 HEADER = b"\x00\x01\x00\x00"
 TRIGGER_REQUEST = HEADER + b"\x00"
-"""std_srvs/srv/Trigger has no fields; a structure without members is written as one byte."""
+"""A request of std_srvs/srv/Trigger has no fields, and a structure without members is written as one byte."""
 LONGEST_REQUEST = 8
-"""The one byte and its padding; some send the header alone."""
+"""The one byte and its padding. Some clients send the header alone."""
 _ORDERS = {0: ">", 1: "<"}
 
 
 class CdrReader:
-    """Reads fields in their order. Each method raises :class:`MalformedMessage` where the buffer ends early."""
+    """Reads fields in their order. Each method raises :class:`MalformedMessage` if the buffer ends too early."""
 
     def __init__(self, data: bytes) -> None:
         if len(data) < len(HEADER) or data[0] != 0 or data[1] not in _ORDERS:
@@ -29,24 +29,24 @@ class CdrReader:
         self._at = 0
 
     def uint8(self) -> int:
-        """One byte."""
+        """Read one byte."""
         return self._bytes(1)[0]
 
     def bool(self) -> bool:
-        """One byte, 0 or 1."""
+        """Read one byte, which is 0 or 1."""
         value = self.uint8()
         if value > 1:
             raise MalformedMessage(f"cdr: bool {value}: it must be 0 or 1")
         return value == 1
 
     def uint32(self) -> int:
-        """Four bytes, aligned."""
+        """Read four bytes, aligned to four."""
         self._at += -self._at % 4
         value: int = struct.unpack(f"{self._order}I", self._bytes(4))[0]
         return value
 
     def string(self) -> str:
-        """Length with the final NUL, bytes, NUL."""
+        """Read a string: its length with the final NUL, its bytes, and NUL."""
         length = self.uint32()
         raw = self._bytes(length)
         if length and raw[-1] != 0:
@@ -57,7 +57,7 @@ class CdrReader:
             raise MalformedMessage("cdr: string: it must be UTF-8") from e
 
     def strings(self) -> list[str]:
-        """A sequence of strings."""
+        """Read a sequence of strings."""
         count = self.uint32()
         if count * 4 > len(self._data) - self._at:
             raise MalformedMessage(f"cdr: sequence of {count} strings: the message is too short for it")
@@ -75,12 +75,12 @@ class CdrReader:
 
 
 def encode_string(text: str) -> bytes:
-    """std_msgs/msg/String. Raises :class:`MalformedMessage` for a text with NUL in it."""
+    """Return a std_msgs/msg/String. Raise :class:`MalformedMessage` if the text contains NUL."""
     return HEADER + _string(text)
 
 
 def decode_string(data: bytes) -> str:
-    """The text of a std_msgs/msg/String."""
+    """Return the text of a std_msgs/msg/String."""
     return CdrReader(data).string()
 
 
@@ -92,12 +92,12 @@ def check_trigger_request(data: bytes) -> None:
 
 
 def encode_trigger_response(success: bool, message: str) -> bytes:
-    """The response of std_srvs/srv/Trigger."""
+    """Return a response of std_srvs/srv/Trigger."""
     return HEADER + bytes([success, 0, 0, 0]) + _string(message)
 
 
 def decode_trigger_response(data: bytes) -> tuple[bool, str]:
-    """``success`` and ``message`` of a Trigger response."""
+    """Return ``success`` and ``message`` of a Trigger response."""
     reader = CdrReader(data)
     return reader.bool(), reader.string()
 

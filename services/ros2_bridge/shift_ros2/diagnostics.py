@@ -1,6 +1,6 @@
 """The counts and reasons that ``/shift/diagnostics`` publishes. Pure: the caller passes the time.
 
-A text at most every ``interval_s``, and only where there is news: a million bad messages are one number.
+A text is published at most every ``interval_s`` seconds and only after a change: a million bad messages are one number.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ class Diagnostics:
     _news: bool = True
     _due_s: float = 0.0
 
-    def came(self, topic: str, count: int = 1) -> None:
+    def count_received(self, topic: str, count: int = 1) -> None:
         """Count a received message; it alone causes no report."""
         self.received[topic] += count
 
-    def lost(self, topic: str, error: ShiftError, count: int = 1, reason: str = "") -> None:
+    def count_lost(self, topic: str, error: ShiftError, count: int = 1, reason: str = "") -> None:
         """Count dropped or refused messages; the next report has the last reason."""
         key = (topic, reason or error.kind)
         if key not in self.dropped and len(self.dropped) >= TOPICS:
@@ -44,7 +44,7 @@ class Diagnostics:
         }  # fmt: skip
         self._news = True
 
-    def now(self, state: str) -> None:
+    def set_state(self, state: str) -> None:
         """Set the state of the bridge: ``ready``, or what it waits for."""
         self._news = self._news or state != self.state
         self.state = state

@@ -1,7 +1,7 @@
-"""The wire of ``rmw_zenoh``: keys, liveliness tokens, QoS, attachments, type hashes. Pure.
+"""The wire format of ``rmw_zenoh``: keys, liveliness tokens, QoS, attachments and type hashes. Pure.
 
-Sources: measured with ``rmw_zenoh_cpp`` and Kilted's nodes; hashes from ``share/*/{msg,srv}/*.json`` of
-ROS. Its design page is outdated on the attachment: it is 33 bytes, and what lacks it is dropped.
+Sources: measurements with ``rmw_zenoh_cpp`` and nodes of Kilted; the hashes are from ``share/*/{msg,srv}/*.json`` of
+ROS. The design page of ``rmw_zenoh`` is outdated: an attachment has 33 bytes, and a sample without one is dropped.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Literal
 from shift_schemas.errors import MalformedMessage, shorten
 
 NO_HASH = "TypeHashNotSupported"
-"""What Humble writes where the others write a type's hash."""
+"""The text that Humble writes instead of a type's hash."""
 WITHOUT_HASHES = frozenset({"foxy", "galactic", "humble"})
-"""Distributions that know no type hashes; Iron brought them."""
+"""The distributions before Iron, which introduced type hashes."""
 Kind = Literal["NN", "MP", "MS", "SS", "SC"]
 """Node, message publisher, message subscription, service server, service client."""
 DEFAULT_DEPTH = 42
-"""A depth that the token leaves out."""
+"""The depth that a token leaves out."""
 GID_BYTES = 16
 _ATTACHMENT = struct.Struct("<qqB16s")
 
@@ -39,11 +39,11 @@ class RosType:
         return f"{package}::{kind}::dds_::{name}_"
 
     def hash_in(self, distribution: str) -> str:
-        """What a publisher of this distribution writes."""
+        """Return the hash that a publisher of this distribution writes."""
         return NO_HASH if distribution in WITHOUT_HASHES else self.hash
 
     def fits(self, written: str) -> bool:
-        """Whether a peer that wrote this hash means this type. An empty hash of ours fits all."""
+        """Return whether a peer that wrote this hash uses this type. A type of ours without a hash fits every hash."""
         return not self.hash or written in (self.hash, NO_HASH)
 
 
@@ -56,17 +56,17 @@ TRIGGER = RosType(
 
 
 def data_key(domain: int, name: str, kind: RosType, written_hash: str) -> str:
-    """Where a topic's samples or a service's requests go; ``*`` for the hash hears every distribution."""
+    """Return the key of a topic's samples or of a service's requests; the hash ``*`` matches every distribution."""
     return f"{domain}/{name.strip('/')}/{kind.dds}/{written_hash}"
 
 
 def hash_of(key: str) -> str:
-    """The hash in a key."""
+    """Return the hash in a key."""
     return key.rsplit("/", 1)[-1]
 
 
 def qos_text(reliable: bool, depth: int) -> str:
-    """QoS as tokens have it: volatile, keep last; fields are empty where they are the default."""
+    """Return the QoS as tokens write it: volatile, keep last. A field with its default value is empty."""
     return f"{'' if reliable else 2}::,{'' if depth == DEFAULT_DEPTH else depth}:,:,:,,"
 
 
@@ -82,37 +82,37 @@ class Node:
     enclave: str = ""
 
     def token(self) -> str:
-        """The token that shows the node."""
+        """Return the token that announces the node."""
         return self._token(self.nid, "NN")
 
     def entity_token(self, entity: int, kind: Kind, topic: str, of: RosType, written_hash: str, qos: str) -> str:
-        """The token that shows one of its publishers, subscriptions or services."""
-        return f"{self._token(entity, kind)}/{_mangled(topic)}/{of.dds}/{written_hash}/{qos}"
+        """Return the token that announces one of its publishers, subscriptions or services."""
+        return f"{self._token(entity, kind)}/{_mangle(topic)}/{of.dds}/{written_hash}/{qos}"
 
     def _token(self, entity: int, kind: Kind) -> str:
-        place = f"{_mangled(self.enclave or '/')}/{_mangled(self.namespace or '/')}/{self.name}"
+        place = f"{_mangle(self.enclave or '/')}/{_mangle(self.namespace or '/')}/{self.name}"
         return f"@ros2_lv/{self.domain}/{self.zid}/{self.nid}/{entity}/{kind}/{place}"
 
 
-def _mangled(name: str) -> str:
+def _mangle(name: str) -> str:
     return name.replace("/", "%")
 
 
 @dataclass(frozen=True)
 class Attachment:
-    """What goes with each sample, request and reply; a reply repeats its request's sequence and gid."""
+    """The data beside each sample, request and reply. A reply repeats the sequence and the gid of its request."""
 
     sequence: int
     stamp_ns: int
     gid: bytes
 
     def encode(self) -> bytes:
-        """33 bytes."""
+        """Return the 33 bytes."""
         return _ATTACHMENT.pack(self.sequence, self.stamp_ns, GID_BYTES, self.gid)
 
     @classmethod
     def decode(cls, data: bytes) -> Attachment:
-        """The inverse. Raises :class:`MalformedMessage`."""
+        """Return the attachment that :meth:`encode` wrote. Raise :class:`MalformedMessage` for other bytes."""
         if len(data) != _ATTACHMENT.size:
             raise MalformedMessage(
                 f"attachment: {len(data)} bytes: rmw_zenoh sends {_ATTACHMENT.size} with each sample"
@@ -123,10 +123,10 @@ class Attachment:
         return cls(sequence, stamp_ns, gid)
 
     def name(self) -> str:
-        """An id for what it came with: the same request gets the same decision, should it come twice."""
+        """Return an id of the request, so that a request that arrives twice gets the same decision."""
         return f"ros-{blake2b(self.encode(), digest_size=12).hexdigest()}"
 
 
 def gid_of(token: str) -> bytes:
-    """A gid for an entity: 16 bytes that depend on its token alone, as in ``rmw_zenoh`` (which uses another hash)."""
+    """Return the gid of an entity: 16 bytes of its token's hash. ``rmw_zenoh`` uses another hash function."""
     return blake2b(token.encode(), digest_size=GID_BYTES).digest()

@@ -1,7 +1,8 @@
-"""ROS4HRI (REP-155), as far as it is honest: who is tracked and how engaged, as markers in the recording. Pure.
+"""ROS4HRI (REP-155): the tracked persons and their engagement become markers in the recording. Pure.
 
-``hri_msgs`` is no part of ROS's common messages: the native backend reads its CDR, the rclpy backend needs
-the package. ``hri_msgs/msg/Gaze`` names persons (sender, receiver), never objects: it is no AOI, and not read.
+``hri_msgs`` does not belong to the common messages of ROS: the native backend decodes its CDR, and the rclpy backend
+needs the package. ``hri_msgs/msg/Gaze`` names persons (sender, receiver) and not objects, so that it cannot serve as
+gaze on AOIs and is not read.
 """
 
 from __future__ import annotations
@@ -16,35 +17,35 @@ ENGAGEMENT = "/humans/persons/*/engagement_status"
 IDS_LIST = RosType("hri_msgs/msg/IdsList", "")
 ENGAGEMENT_LEVEL = RosType("hri_msgs/msg/EngagementLevel", "")
 LEVELS = ("unknown", "disengaged", "engaging", "engaged", "disengaging")
-"""``hri_msgs/msg/EngagementLevel``'s constants, 0 to 4."""
+"""The constants of ``hri_msgs/msg/EngagementLevel``, 0 to 4."""
 PERSONS = 256
 
 
 def tracked_of(data: bytes) -> list[str]:
-    """The ids of a ``hri_msgs/msg/IdsList``."""
+    """Return the ids of a ``hri_msgs/msg/IdsList``."""
     reader = _after_header(data)
     return reader.strings()
 
 
 def level_of(data: bytes) -> int:
-    """The level of a ``hri_msgs/msg/EngagementLevel``."""
+    """Return the level of a ``hri_msgs/msg/EngagementLevel``."""
     return _after_header(data).uint8()
 
 
 def person_of(topic: str) -> str:
-    """The person whose engagement this topic tells."""
+    """Return the person whose engagement a topic carries."""
     return topic.strip("/").split("/")[2]
 
 
 class Persons:
-    """Remembers what was told, so that a marker is written where something changes and not thirty times a second."""
+    """Remembers the last values, so that a marker is written only for a change and not thirty times a second."""
 
     def __init__(self) -> None:
         self._tracked: list[str] | None = None
         self._levels: dict[str, int] = {}
 
     def tracked(self, ids: list[str]) -> str | None:
-        """The marker's text, if the persons are others than before."""
+        """Return the text of the marker; None if the same persons are tracked as before."""
         now = sorted(map(shorten, ids))[:PERSONS]
         if now == self._tracked:
             return None
@@ -53,7 +54,7 @@ class Persons:
         return f"ROS4HRI tracked: {', '.join(now) or 'nobody'}"
 
     def engagement(self, person: str, level: int) -> str | None:
-        """The marker's text, if the person's level is another than before. Raises :class:`MalformedMessage`."""
+        """Return the text of the marker; None if the person's level is unchanged. Raise :class:`MalformedMessage`."""
         if not 0 <= level < len(LEVELS):
             raise MalformedMessage(f"engagement_status: level {level}: it must be 0 to {len(LEVELS) - 1}")
         if self._levels.get(person) == level or (person not in self._levels and len(self._levels) >= PERSONS):
@@ -63,7 +64,7 @@ class Persons:
 
 
 def _after_header(data: bytes) -> CdrReader:
-    """std_msgs/msg/Header: a stamp (two numbers) and a frame."""
+    """Return a reader after the std_msgs/msg/Header: a stamp (two numbers) and a frame."""
     reader = CdrReader(data)
     reader.uint32()
     reader.uint32()

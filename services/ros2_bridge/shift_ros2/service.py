@@ -1,4 +1,4 @@
-"""The bridge as a process: settings, its two sessions, signals."""
+"""The process of the bridge: its settings, its sessions with the mesh and with ROS, and its signals."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DRAIN_S = 2.0
 
 
 def run_bridge(line: Sequence[str]) -> None:
-    """Run until SIGINT or SIGTERM; its exit code is 0 then, 2 for settings that are not valid."""
+    """Run the bridge until SIGINT or SIGTERM. Exit with 0, or with 2 if a setting is not valid."""
     try:
         settings = bridge_settings(line)
         configure_logs(SERVICE, settings)
@@ -43,19 +43,19 @@ def run_bridge(line: Sequence[str]) -> None:
 
 
 async def serve(settings: BridgeSettings) -> None:
-    """The bridge on both its sides, until a signal."""
+    """Serve the mesh and ROS until a signal arrives."""
     stop = asyncio.Event()
     _on_signal(stop.set)
     bus = await ZenohBus.open(settings.zenoh, settings.listen)
     metrics = Metrics(SERVICE)
-    replica = ReadModel(bus, metrics.dropped, metrics.link_lost)
-    bridge = Bridge(settings, MeshApi(MeshClient(bus, settings.patience_s), replica), metrics, SystemClock())
-    replica.reader.start()
-    pulling = asyncio.create_task(replica.reader.run())
+    read_model = ReadModel(bus, metrics.dropped, metrics.link_lost)
+    bridge = Bridge(settings, MeshApi(MeshClient(bus, settings.patience_s), read_model), metrics, SystemClock())
+    read_model.reader.start()
+    pulling = asyncio.create_task(read_model.reader.run())
     try:
         bridge.backend = await open_backend(settings, bridge)
-        _on_signal(stop.set)  # rclpy's executor takes the signals for itself
-        _show(bus, bridge, metrics)
+        _on_signal(stop.set)  # rclpy's executor replaces the signal handlers
+        _serve_health(bus, bridge, metrics)
         log.info(
             "started", node=settings.node, namespace=settings.namespace, session=bridge.session,
             backend=settings.backend, mesh=settings.zenoh,
@@ -78,7 +78,7 @@ async def serve(settings: BridgeSettings) -> None:
 
 
 async def open_backend(settings: BridgeSettings, bridge: Bridge) -> Backend:
-    """The backend that the settings name; the other one is not imported."""
+    """Return the backend that the settings name. The other one is not imported."""
     if settings.backend == "rclpy":
         from shift_ros2.rclpy_backend import RclpyBackend
 
@@ -93,7 +93,7 @@ def _on_signal(stop: Callable[[], None]) -> None:
         asyncio.get_running_loop().add_signal_handler(number, stop)
 
 
-def _show(bus: ZenohBus, bridge: Bridge, metrics: Metrics) -> None:
+def _serve_health(bus: ZenohBus, bridge: Bridge, metrics: Metrics) -> None:
     def health() -> Health:
         state = bridge.diagnostics.state
         return Health(service=SERVICE, ready=state == "ready", detail="" if state == "ready" else state, sessions=1)
