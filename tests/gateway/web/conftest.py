@@ -15,9 +15,9 @@ from support.whole_mesh import LiveMesh, running_mesh
 OpenTab = Callable[..., AbstractContextManager[Tab]]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """The browser of all tests."""
+    """The browser of a module: while it is open, its event loop runs, and no anyio test can start one."""
     with chromium() as found:
         yield found
 

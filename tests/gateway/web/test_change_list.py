@@ -105,6 +105,7 @@ def test_rows_have_a_button_where_there_is_an_action() -> None:
     made = [Change(0, "configuration 2", "", "x", "in force", "undo", "2"), Change(0, "marker", "", "y", "retracted")]
     buttons = [row.cells[-1].button for row in change_rows(made) if not isinstance(row.cells[-1], str)]
     assert [(b.name, b.value) for b in buttons if b] == [("undo", "undo 2")]
+    assert [row.cells[-1] for row in change_rows(made, live=False)] == ["", ""]
     assert [row.cells[0] for row in change_rows([])] == ["no change yet"]
 
 

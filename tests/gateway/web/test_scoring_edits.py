@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from shift_gateway.web.scoring_edits import changed_states, editable, scoring_patch, value_at
+from shift_gateway.web.scoring_edits import changed_states, editable, is_number, scoring_patch, value_at
 from shift_schemas.errors import InvalidStudy, MalformedMessage
 from shift_study.loading import patched, study_json, study_of
 from shift_study.scoring import reductions
@@ -55,6 +55,10 @@ def test_changed_states_are_those_in_which_the_reductions_differ() -> None:
         if before[t].cognitive_state != after[t].cognitive_state
     }
     assert found
+
+
+def test_number_may_be_typed_in_other_ways() -> None:
+    assert [is_number(typed, 0.5) for typed in ("0.50", " .5", "0.6", "half")] == [True, True, False, False]
 
 
 def test_nothing_changes_without_an_edit() -> None:

@@ -82,12 +82,12 @@ def changes(history: SessionHistory, at_ns: int = END_OF_TIME) -> list[Change]:
     return sorted(found, key=lambda change: change.ns, reverse=True)
 
 
-def change_rows(found: list[Change]) -> list[Row]:
-    """Return a row for each change; it has a button if the change can be reversed."""
+def change_rows(found: list[Change], live: bool = True) -> list[Row]:
+    """Return a row for each change; it has a button if the change can be reversed and the session is live."""
     return [
         Row([
             clock_time(c.ns), c.author or "–", c.kind, c.what, c.now,
-            Cell(button=_reversing(c)) if c.action else "",
+            Cell(button=_reversing(c)) if c.action and live else "",
         ])
         for c in found
     ] or [Row(["no change yet", "", "", "", "", ""])]  # fmt: skip

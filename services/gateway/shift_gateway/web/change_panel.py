@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from nicegui import ui
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Mark, SetOverride
 
 from shift_gateway.web.change_list import LONGEST, REVERSE, change_rows, changes, undo_patch
@@ -36,7 +37,9 @@ class ChangePanel:
         if key == self._key:
             return ""
         self._key = key
-        return self._table.script(change_rows(changes(self._history)))
+        session = self._history.session()
+        live = session is None or not has_ended(session.state)
+        return self._table.script(change_rows(changes(self._history), live))
 
     async def _reverse(self, event: Any) -> None:
         action, _, target = str(event.args).partition(" ")

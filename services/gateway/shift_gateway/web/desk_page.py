@@ -90,5 +90,7 @@ class DeskPage:
         if has_ended(numbers.state) and not self._ended.text:
             self._ended.text = "This session has ended."
             self._pause.disable()
+            self._result.disable()
+            self._editor.disable()
         self._result.update()
         return self._elements.script(now_ns) + self._editor.script() + self._changes.script()

@@ -36,7 +36,7 @@ class ResultEntry:
             with ui.element("div").classes("bar"):
                 self._duration = _seconds("Time to solve it, s", "result-duration")
                 self._second = _seconds("Enabledness: other time, s", "result-duration-enabledness")
-                testid(ui.button("Enter the result", on_click=self._enter).props("outline"), "result")
+                self._button = testid(ui.button("Enter the result", on_click=self._enter).props("outline"), "result")
             self._note = text("", "muted")
 
     def select(self, n: int) -> None:
@@ -45,6 +45,10 @@ class ResultEntry:
         if found is not None and found.decision_id in (self._decision.options or {}):
             self._chosen = True
             self._decision.value = found.decision_id
+
+    def disable(self) -> None:
+        """Accept no result any more."""
+        self._button.disable()
 
     def update(self) -> None:
         """Offer the newest decisions."""

@@ -16,6 +16,7 @@ from shift_gateway.web.scoring_edits import (
     categories,
     changed_states,
     editable,
+    is_number,
     scoring_patch,
     table_name,
     value_at,
@@ -40,7 +41,7 @@ class ScoringEditor:
             self._grid(study)
             with ui.element("div").classes("bar"):
                 testid(ui.button("Preview", on_click=self._preview).props("outline"), "preview")
-                testid(ui.button("Apply", on_click=self._apply).props("outline"), "apply")
+                self._apply_button = testid(ui.button("Apply", on_click=self._apply).props("outline"), "apply")
                 testid(ui.button("Discard edits", on_click=self._discard).props("flat"), "discard")
 
     def preview_panel(self) -> None:
@@ -114,6 +115,10 @@ class ScoringEditor:
 
     # --- what changes ---
 
+    def disable(self) -> None:
+        """Accept no change any more."""
+        self._apply_button.disable()
+
     def script(self) -> str:
         """Follow the newest configuration; return the JavaScript that shows what the edits would change."""
         config, study = self._history.configs.last(), self._history.study()
@@ -136,8 +141,9 @@ class ScoringEditor:
         paths = editable(study)
         for name, box in self._inputs.items():
             edited = box.value != self._shown[name]
-            self._shown[name] = f"{value_at(study, paths[name]):g}"
-            if not edited:
+            value = value_at(study, paths[name])
+            self._shown[name] = f"{value:g}"
+            if not edited or is_number(str(box.value), value):
                 box.value = self._shown[name]
 
     def _rows(self, study: Study, typed: dict[str, str]) -> list[Row]:

@@ -55,6 +55,14 @@ def number_of(name: str, typed: str) -> float:
         raise MalformedMessage(f"{name}: {rule}", (FieldError(field=name, value=typed[:40], rule=rule),)) from None
 
 
+def is_number(typed: str, value: float) -> bool:
+    """Return whether somebody typed this number."""
+    try:
+        return number_of("", typed) == value
+    except MalformedMessage:
+        return False
+
+
 def scoring_patch(study: Study, typed: Mapping[str, str]) -> dict[str, Any]:
     """Return the merge patch with the values that differ from the study's, by what the inputs contain.
 

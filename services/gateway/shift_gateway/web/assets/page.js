@@ -73,11 +73,8 @@
     parent.append(e);
     return e;
   };
-  const words = (parent, text) => { // text only, never markup; a long word can break after an underscore
-    String(text).split('_').forEach((part, i) => {
-      if (i) parent.append('_', document.createElement('wbr'));
-      parent.append(part);
-    });
+  const words = (parent, text) => { // text only, never markup; a long word can break after an underscore or a slash
+    for (const part of String(text).split(/(?<=[_/])/)) parent.append(part, ...(/[_/]$/.test(part) ? [document.createElement('wbr')] : []));
   };
   const fillCell = (td, cell) => {
     if (typeof cell === 'string') { words(td, cell); return; }
