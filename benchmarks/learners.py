@@ -1,11 +1,12 @@
-"""What a decision of the planner costs: live (one session, the whole policy) and in simulation (runs at once).
+"""Measure the time of a planner's decision: live (one session, the whole policy) and in simulation (batched runs).
 
     python benchmarks/learners.py [--runs 1000] [--families 20]
 
-``--families`` tells instead what learners get from that many people of each generated family (docs/learners.md).
+With ``--families``, print instead the mean rewards of learners with that many users of each generated family
+(docs/learners.md).
 
-Live, a decision is a decided and a rewarded with the 30 rows published after each. Exit code 1 where the median is
-2 ms or more live, or 0.2 ms or more in simulation.
+A live decision has the updates after the decision and after the reward, each with the 30 rows of the policy. The exit
+code is 1 if the median is 2 ms or more live, or 0.2 ms or more in simulation.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ LIVE_MS, SIMULATED_MS = 2.0, 0.2
 
 
 def live(name: str, interactions: int = 100) -> tuple[list[float], int]:
-    """Milliseconds per decision along a real course of events, and the size of the memory at the end in bytes."""
+    """Return the milliseconds of each decision in a simulated session, and the final size of the memory in bytes."""
     context = Context(Study.model_validate({"study": "s", "learner": {"name": name}}))
     learner, memory = learner_named(name), learner_named(name).initial(context)
     trace = simulate(paper_user("B"), context.study, batch_learner(context, 1), session_seeds(1, 1), interactions)
@@ -52,30 +53,30 @@ def live(name: str, interactions: int = 100) -> tuple[list[float], int]:
 
 
 def main() -> int:
-    """Measure, print, judge."""
+    """Measure and print; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--families", type=int, default=0)
-    asked = parser.parse_args()
-    return families(asked.families) if asked.families else speed(asked.runs)
+    options = parser.parse_args()
+    return families(options.families) if options.families else speed(options.runs)
 
 
 def families(people: int, runs: int = 32) -> int:
-    """Mean reward per family and learner over ``people`` of it, and the mean of their exact optima."""
+    """Print the mean reward of each learner with ``people`` users of each family, and their mean exact optimum."""
     for name, family in FAMILIES.items():
         users = [family(np.random.default_rng([2026, i])) for i in range(people)]
         best = np.mean([optimum(user, Study(study="s"), 100) for user in users])
-        found = {
+        rewards = {
             learner: [rewards_of(learner, user, i, runs)[-1].mean() for i, user in enumerate(users)]
             for learner in ("planner", "q-learning", "scoring")
         }
-        said = "   ".join(f"{k} {np.mean(v):6.1f} +- {np.std(v) / people**0.5:.1f}" for k, v in found.items())
-        print(f"{name:26}{said}   optimum {best:.1f}", flush=True)
+        means = "   ".join(f"{k} {np.mean(v):6.1f} +- {np.std(v) / people**0.5:.1f}" for k, v in rewards.items())
+        print(f"{name:26}{means}   optimum {best:.1f}", flush=True)
     return 0
 
 
 def speed(runs: int) -> int:
-    """Of the planner."""
+    """Print the speed and the reward of the planner; return the exit code."""
     simulated = []
     for user in PAPER_USERS:
         begin = time.process_time()

@@ -1,6 +1,8 @@
-"""The REST door beside a bare FastAPI hello, request by request in turn: medians and ratios with their spread.
+"""Compare REST requests with a minimal FastAPI application: medians, and ratios with their quartiles.
 
-``python benchmarks/rest.py``. Every request is a new one on the same kept-alive connection. Ratios hold, times drift.
+    python benchmarks/rest.py
+
+The requests take turns on connections that stay open. Compare ratios: times change with the load of the machine.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ uvicorn.run(app, port=int(sys.argv[1]), log_level="warning", access_log=False)
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print the times of all requests."""
     port = free_port()
     bare = subprocess.Popen([sys.executable, "-c", BARE, str(port)])
     try:
@@ -74,13 +76,13 @@ def _measure(hello: httpx.Client, shift: httpx.Client) -> None:
             f"{path}/performance", json={"decision_id": f"d{n}", "comprehension": result, "enabledness": result}
         ),
     }
-    taken: dict[str, list[float]] = {name: [] for name in requests}
+    times: dict[str, list[float]] = {name: [] for name in requests}
     for n in range(ROUNDS):
         for name, request in requests.items():
-            begun = time.perf_counter()
+            start = time.perf_counter()
             request(n).raise_for_status()
-            taken[name].append(time.perf_counter() - begun)
-    _print(taken)
+            times[name].append(time.perf_counter() - start)
+    _print(times)
 
 
 def _chunk(n: int) -> dict[str, object]:
@@ -88,10 +90,10 @@ def _chunk(n: int) -> dict[str, object]:
     return {"source": "bench", "seq": n, "t": t, "x": [0.1] * 10, "y": [0.5] * 10, "valid": [True] * 10}
 
 
-def _print(taken: dict[str, list[float]]) -> None:
-    reference = next(iter(taken.values()))
+def _print(times: dict[str, list[float]]) -> None:
+    reference = next(iter(times.values()))
     print(f"{'request':40} {'median':>10} {'ratio to hello: quartiles':>32}")
-    for name, seconds in taken.items():
+    for name, seconds in times.items():
         low, middle, high = statistics.quantiles([s / r for s, r in zip(seconds, reference, strict=True)], n=4)
         print(f"{name:40} {statistics.median(seconds) * 1e3:8.2f} ms {low:10.2f} {middle:10.2f} {high:10.2f}")
 

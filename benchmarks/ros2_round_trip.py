@@ -1,13 +1,15 @@
-"""What the bridge costs: a service call through it against its parts, measured in one run, turn by turn.
+"""Compare a service call through the ROS bridge with its parts, in turns within one run.
 
-``call <= 1.5 * (bare + get + fsync)``: *call* is ``/shift/next_strategy`` through bridge and decider, *bare* the
-same client's call of a Trigger server of its own kind that answers at once (pyzeros, rclpy), *get* one
-Zenoh request between two processes, none of our code on either side, *fsync* 4 KB to the disk of the journals.
-Medians, microseconds.
+The limit is ``call <= 1.5 * (bare + get + fsync)``, for medians in microseconds:
+
+- *call* is ``/shift/next_strategy`` through bridge and decider;
+- *bare* is a call from the same client to a Trigger server of its own kind (pyzeros, rclpy) that answers at once;
+- *get* is one Zenoh request between two processes without any code of this project;
+- *fsync* writes 4 KB to the disk of the journals.
 
     python benchmarks/ros2_round_trip.py [--calls 200] [--backend native|rclpy] [--pause SECONDS] [--check]
 
-For ``rclpy`` the client and the bridge run in the environment that tests/support/ros_environments.py makes.
+For ``rclpy``, the client and the bridge run in the environment that tests/support/ros_environments.py makes.
 """
 
 from __future__ import annotations
@@ -31,12 +33,12 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "tests")]
 PAUSE_S = 0.03
-"""Between measurements: a robot's calls are seconds apart, and what a decision leads to must be over."""
+"""Time between measurements: the work that follows a decision must be complete, as between a robot's calls."""
 LIMIT = 1.5
 
 
 def main() -> None:
-    """Measure and print; with ``--check`` exit code 1 above the limit."""
+    """Measure and print; with ``--check``, exit with 1 above the limit."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--calls", type=int, default=200)
     parser.add_argument("--backend", default="native")
@@ -51,7 +53,7 @@ def main() -> None:
 
 
 def measure(folder: Path, backend: str, calls: int, pause_s: float, stack: ExitStack) -> dict[str, float]:
-    """The medians, in microseconds, and their ratio."""
+    """Return the medians in microseconds, and their ratio."""
     from support.ros_rig import Bridge, rpc_peer
     from support.whole_mesh import running_mesh
 
@@ -68,22 +70,22 @@ def measure(folder: Path, backend: str, calls: int, pause_s: float, stack: ExitS
         "get": get,
         "fsync": lambda: fsync(folder),
     }
-    found: dict[str, list[float]] = {kind: [] for kind in kinds}
+    times_us: dict[str, list[float]] = {kind: [] for kind in kinds}
     for turn in range(calls + 20):
-        for kind, one in kinds.items():
-            took = one()
+        for kind, measure_s in kinds.items():
+            time_s = measure_s()
             if turn >= 20:
-                found[kind].append(took * 1e6)
+                times_us[kind].append(time_s * 1e6)
             time.sleep(pause_s)
-    medians = {kind: round(statistics.median(times), 1) for kind, times in found.items()}
-    medians["p90_call"] = round(statistics.quantiles(found["call"], n=10)[8], 1)
+    medians = {kind: round(statistics.median(times), 1) for kind, times in times_us.items()}
+    medians["p90_call"] = round(statistics.quantiles(times_us["call"], n=10)[8], 1)
     medians["ratio"] = round(medians["call"] / (medians["bare"] + medians["get"] + medians["fsync"]), 3)
     return medians
 
 
 @contextmanager
 def bare_server(bridge: Bridge) -> Iterator[None]:
-    """A Trigger server of the client's kind with nothing behind it."""
+    """Run a Trigger server of the client's kind that answers at once."""
     from support.ros_environments import python_of, work_folder
 
     kind = "pyzeros" if bridge.backend == "native" else "rclpy"
@@ -98,7 +100,7 @@ def bare_server(bridge: Bridge) -> Iterator[None]:
 
 @contextmanager
 def getter(router: str) -> Iterator[Callable[[], float]]:
-    """One Zenoh request of this process to another, linked as the mesh's services are."""
+    """Yield a function that times one Zenoh request to another process, with the links of the mesh's services."""
     from shift_runtime.bus.zenoh_config import zenoh_config
     from zenoh import open as open_session
 
@@ -109,10 +111,10 @@ def getter(router: str) -> Iterator[Callable[[], float]]:
         while True:
             started = time.perf_counter()
             replies = list(session.get("bench/get", payload=b"x" * 200, timeout=5.0))
-            took = time.perf_counter() - started
+            time_s = time.perf_counter() - started
             if replies:
-                return took
-            time.sleep(0.01)  # it is not there yet
+                return time_s
+            time.sleep(0.01)  # the server is not ready yet
 
     try:
         yield get
@@ -123,7 +125,7 @@ def getter(router: str) -> Iterator[Callable[[], float]]:
 
 
 def fsync(folder: Path) -> float:
-    """Seconds that 4 KB take to the disk."""
+    """Return the seconds to write 4 KB to the disk."""
     with open(folder / "fsync", "ab") as file:
         file.write(os.urandom(4096))
         file.flush()

@@ -1,6 +1,6 @@
-"""How long ``shift-mesh up`` takes until ``/readyz`` is true: median of five with spread.
+"""Measure the time from ``shift-mesh up`` until ``/readyz`` is true: median and range of five runs.
 
-And from kill -9 of each service until it is ready again. Run it with nothing else running.
+Measure also the time from kill -9 of each service until the mesh is ready again. Run it on an idle machine.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ SERVICES = (
 
 
 def startup(folder: Path) -> float:
-    """Seconds from the command to ready."""
-    begun = time.monotonic()
+    """Return the seconds from the command until the mesh is ready."""
+    start = time.monotonic()
     with running_mesh(folder):
-        return time.monotonic() - begun
+        return time.monotonic() - start
 
 
 def recovery(mesh: LiveMesh, package: str) -> float:
-    """Seconds from kill -9 of a service that had lived for a while to ready."""
+    """Return the seconds from kill -9 of a running service until the mesh is ready again."""
     time.sleep(3.5)
     before = mesh.pid_of(package)
-    begun = time.monotonic()
+    start = time.monotonic()
     mesh.kill(package)
-    mesh.until(lambda: _there(mesh, package) not in (None, before))
+    mesh.until(lambda: _find_pid(mesh, package) not in (None, before))
     mesh.wait_ready()
-    return time.monotonic() - begun
+    return time.monotonic() - start
 
 
-def _there(mesh: LiveMesh, package: str) -> int | None:
+def _find_pid(mesh: LiveMesh, package: str) -> int | None:
     try:
         return mesh.pid_of(package)
     except AssertionError:
@@ -51,13 +51,13 @@ def _there(mesh: LiveMesh, package: str) -> int | None:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure and print all times."""
     with tempfile.TemporaryDirectory() as folder:
         startup(Path(folder) / "warm")
-        took = sorted(startup(Path(folder) / str(run)) for run in range(RUNS))
+        times_s = sorted(startup(Path(folder) / str(run)) for run in range(RUNS))
         print(
-            f"shift-mesh up to /readyz true: median {statistics.median(took):.2f} s"
-            f" ({took[0]:.2f} to {took[-1]:.2f}, {RUNS} runs)"
+            f"shift-mesh up to /readyz true: median {statistics.median(times_s):.2f} s"
+            f" ({times_s[0]:.2f} to {times_s[-1]:.2f}, {RUNS} runs)"
         )
         with running_mesh(Path(folder) / "recovery") as mesh:
             for package in SERVICES:

@@ -83,13 +83,13 @@ def test_an_output_folder_that_cannot_be_made_is_said_before_anything_is_compute
 
 
 def test_a_user_file_with_a_byte_order_mark_is_read(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from shift_simulator.user_files import user_named
+    from shift_simulator.user_files import find_user
     from shift_simulator.users import paper_user
 
     file = tmp_path / "me.json"
     text = paper_user("B").model_copy(update={"user": "me"}).model_dump_json(exclude={"capacity"})
     file.write_text(text, encoding="utf-8-sig")
-    assert user_named(str(file)).user == "me"
+    assert find_user(str(file)).user == "me"
 
 
 # --- numbers ---

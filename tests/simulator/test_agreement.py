@@ -1,4 +1,4 @@
-"""The vectorised simulation and the services' own cores agree step by step for the same session seed."""
+"""The vectorised simulation and the services' cores agree step by step for the same session seed."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from support.agreement import check_agreement
 
 @pytest.mark.parametrize("name", ["A", "B", "C", "D"])
 @pytest.mark.parametrize("learner", [{}, {"scoring_prior": False}, {"name": "scoring"}])
-def test_many_runs_at_once_meet_what_the_cores_meet(name: str, learner: dict[str, object]) -> None:
+def test_batched_simulation_agrees_with_the_cores(name: str, learner: dict[str, object]) -> None:
     study = Study.model_validate({"study": "s", "learner": learner})
     check_agreement(paper_user(name), study, runs=2)
 
 
-def test_a_person_whose_true_capacity_differs_and_who_changes_agrees_too() -> None:
+def test_person_with_changes_and_own_capacity_agrees() -> None:
     user = paper_user("B").model_dump()
     change = {"at": 20, "success": np.random.default_rng(1).random((30, 6)).tolist()}
-    differs = {"capacity": {"recovery": 0.1, "threshold": 0.4}, "changes": [change], "gaze": {"keep": 0.8}, "tasks": 5}
-    check_agreement(User.model_validate(user | differs), Study(study="s"), runs=3)
+    own = {"capacity": {"recovery": 0.1, "threshold": 0.4}, "changes": [change], "gaze": {"keep": 0.8}, "tasks": 5}
+    check_agreement(User.model_validate(user | own), Study(study="s"), runs=3)
 
 
-def test_session_seeds_are_addressed_and_fit_into_a_double() -> None:
+def test_session_seeds_are_counter_based_and_fit_into_a_double() -> None:
     seeds = session_seeds(7, 50)
     assert seeds.tolist() == [session_seed(7, run) for run in range(50)]
     assert seeds.tolist() == [int(uniform(7, run, SESSION) * 2**53) for run in range(50)]
@@ -34,5 +34,5 @@ def test_session_seeds_are_addressed_and_fit_into_a_double() -> None:
 
 
 @pytest.mark.parametrize("learner", ["epsilon-greedy", "ucb1", "thompson", "linear-thompson"])
-def test_every_other_learner_agrees_as_well(learner: str) -> None:
+def test_every_other_learner_agrees(learner: str) -> None:
     check_agreement(paper_user("C"), Study.model_validate({"study": "s", "learner": {"name": learner}}), 1, 25)

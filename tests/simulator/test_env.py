@@ -1,4 +1,4 @@
-"""The Gymnasium environment keeps Gymnasium's contract and meets the partners of the simulation."""
+"""The Gymnasium environment fulfils Gymnasium's contract and simulates the same partners as the simulation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from shift_study.study import Study  # noqa: E402
 
 @pytest.mark.parametrize("user", ["A", "B", "C", "D"])
 @pytest.mark.parametrize("observation", ["states", "triples"])
-def test_it_passes_gymnasiums_own_checker(user: str, observation: str) -> None:
+def test_environment_passes_the_checker_of_gymnasium(user: str, observation: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         check_env(gymnasium.make(ENV_ID, user=user, observation=observation).unwrapped)
@@ -40,13 +40,13 @@ def test_following_the_suggestion_is_nearly_optimal_with_user_a() -> None:
     assert np.mean(totals) == pytest.approx(optimum(paper_user("A"), Study(study="s"), 100), abs=1.5)
 
 
-def test_importing_gymnasium_and_then_the_package_is_enough() -> None:
+def test_importing_the_package_after_gymnasium_registers_the_environment() -> None:
     program = "import gymnasium, shift_simulator; gymnasium.make('shift/Partner-v0', user='B').reset(seed=1)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_one_seed_is_one_session() -> None:
+def test_same_seed_gives_the_same_session() -> None:
     def session() -> list[tuple[int, float]]:
         env = gymnasium.make(ENV_ID, user="B")
         env.reset(seed=3)

@@ -1,4 +1,4 @@
-"""The figures of ``evaluate`` say what they show, and hide nothing."""
+"""The figures of ``evaluate`` describe and show all of their data."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def words_of(svg: Path) -> str:
-    """All text of the figure, in one line."""
+def text_of(svg: Path) -> str:
+    """Return all text of the figure in one line."""
     texts = ("".join(element.itertext()) for element in ElementTree.parse(svg).iter(f"{SVG}text"))
     return " ".join(" ".join(texts).split())
 
@@ -33,37 +33,35 @@ def learners() -> dict[str, Any]:
     return compare.compare(["scoring", "thompson", "q-learning"], people, 3, 20, False, lambda _: None)
 
 
-def test_users_says_what_its_band_is_and_of_how_many_runs(tmp_path: Path) -> None:
+def test_users_figure_describes_its_band_and_number_of_runs(tmp_path: Path) -> None:
     draw_users(user_study.users(5, 12), tmp_path)
-    words = words_of(tmp_path / "users.svg")
-    assert "mean of n = 12 simulated runs (seed 5)" in words
-    assert "Band: the middle 80 % of the runs (10th to 90th percentile)" in words
+    text = text_of(tmp_path / "users.svg")
+    assert "mean of n = 12 simulated runs (seed 5)" in text
+    assert "Band: the middle 80 % of the runs (10th to 90th percentile)" in text
     for label in ("with scoring prior", "without prior", "User A", "User D", "episode", "cumulative reward"):
-        assert label in words
+        assert label in text
 
 
-def test_learners_says_what_its_bands_and_bars_are_and_of_how_many_runs(
-    tmp_path: Path, learners: dict[str, Any]
-) -> None:
+def test_learners_figure_describes_its_bands_bars_and_number_of_runs(tmp_path: Path, learners: dict[str, Any]) -> None:
     draw_learners(learners, tmp_path)
-    words = words_of(tmp_path / "learners.svg")
-    assert "Means of n = 20 simulated runs (seed 3)" in words
-    assert "band: 95 % interval of the mean (± 1.96 standard errors)" in words
-    assert "bar: the middle 80 % of the runs (10th to 90th percentile)" in words
-    assert "User a-person-with-a-rat…" in words
+    text = text_of(tmp_path / "learners.svg")
+    assert "Means of n = 20 simulated runs (seed 3)" in text
+    assert "band: 95 % interval of the mean (± 1.96 standard errors)" in text
+    assert "bar: the middle 80 % of the runs (10th to 90th percentile)" in text
+    assert "User a-person-with-a-rat…" in text
     for name in ("scoring", "thompson", "q-learning"):
-        assert words.count(name) >= 2, "in the legend, and at its own line"
+        assert text.count(name) >= 2, "once in the legend and once at its line"
 
 
 @pytest.mark.parametrize("name", ["users", "learners"])
-def test_the_documentation_s_figures_are_of_this_kind(name: str) -> None:
-    words = words_of(ROOT / "docs" / "figures" / f"{name}.svg")
+def test_figures_in_the_documentation_have_these_captions(name: str) -> None:
+    text = text_of(ROOT / "docs" / "figures" / f"{name}.svg")
     runs = {"users": 500, "learners": 200}[name]
-    assert f"n = {runs} simulated runs (seed 0)" in words
-    assert "10th to 90th percentile" in words
+    assert f"n = {runs} simulated runs (seed 0)" in text
+    assert "10th to 90th percentile" in text
 
 
-def test_the_band_is_the_interval_that_it_is_said_to_be(learners: dict[str, Any]) -> None:
+def test_bands_and_bars_show_the_described_intervals(learners: dict[str, Any]) -> None:
     rewards = compare.rewards_of("q-learning", paper_user("A"), 3, 20)
     curve = next(c for c in learners["curves"] if (c["learner"], c["user"]) == ("q-learning", "A"))
     row = next(r for r in learners["results"] if (r["learner"], r["user"]) == ("q-learning", "A"))
@@ -75,11 +73,11 @@ def test_the_band_is_the_interval_that_it_is_said_to_be(learners: dict[str, Any]
 
 
 @pytest.mark.parametrize("users", [1, 2, 3])
-def test_any_number_of_users_has_a_panel_each(
+def test_each_user_has_a_panel(
     tmp_path: Path, learners: dict[str, Any], users: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr(figures, "saved", lambda figure, out, name: drawn.append(figure) or [])
+    monkeypatch.setattr(figures, "save_figure", lambda figure, out, name: drawn.append(figure) or [])
     first = [c for c in learners["curves"] if c["user"] == "A"]
     rows = [r for r in learners["results"] if r["user"] == "A"]
     names = [f"u{n}" for n in range(users)]
@@ -92,11 +90,11 @@ def test_any_number_of_users_has_a_panel_each(
     assert titles == [f"User {name}" for name in names] * 2
 
 
-def test_no_text_is_smaller_than_8_points_at_the_width_of_a_column(
+def test_text_has_at_least_8_points_at_column_width(
     tmp_path: Path, learners: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr(figures, "saved", lambda figure, out, name: drawn.append(figure) or [])
+    monkeypatch.setattr(figures, "save_figure", lambda figure, out, name: drawn.append(figure) or [])
     draw_learners(learners, tmp_path)
     draw_users(user_study.users(0, 2), tmp_path)
     for figure in drawn:
@@ -108,7 +106,7 @@ def test_no_text_is_smaller_than_8_points_at_the_width_of_a_column(
         assert min(sizes) >= 8
 
 
-def test_no_two_learners_look_alike_also_without_colour() -> None:
+def test_styles_of_learners_differ_even_without_colour() -> None:
     assert len(STYLES) >= len(LEARNERS)
     for one, other in combinations(STYLES, 2):
         assert one.dash != other.dash
@@ -116,11 +114,11 @@ def test_no_two_learners_look_alike_also_without_colour() -> None:
         assert np.abs(np.subtract(to_rgb(one.colour), to_rgb(other.colour))).max() > 0.2
 
 
-def test_the_markers_of_curves_that_coincide_take_turns(
+def test_markers_of_coinciding_curves_alternate(
     tmp_path: Path, learners: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr(figures, "saved", lambda figure, out, name: drawn.append(figure) or [])
+    monkeypatch.setattr(figures, "save_figure", lambda figure, out, name: drawn.append(figure) or [])
     draw_learners(learners, tmp_path)
     lines = [line for line in drawn[0].axes[0].lines if line.get_marker() not in ("None", None, "")]
     places = [set(range(*np.array([line.get_markevery()[0], 100, line.get_markevery()[1]]))) for line in lines]

@@ -1,4 +1,4 @@
-"""Planned gaze brings every gaze class about, judged by the monitor's core itself."""
+"""Planned gaze produces every gaze class, as computed by the monitor's core."""
 
 from __future__ import annotations
 
@@ -61,18 +61,18 @@ def test_every_class_follows_every_class(aois: int) -> None:
         {"focused_dominance": 0.8, "focused_shift": 0.1},
     ],
 )
-def test_other_attention_settings_are_planned_for(attention: dict[str, float]) -> None:
+def test_plans_exist_for_other_attention_settings(attention: dict[str, float]) -> None:
     assert classes_reached(study_with(3, **attention), ALL_PAIRS) == ALL_PAIRS
 
 
-def test_what_no_gaze_can_reach_is_said() -> None:
+def test_unreachable_gaze_class_is_refused() -> None:
     one = study_with(1)
     assert classes_reached(one, ["uncertain", "focused"]) == ["uncertain", "focused"]
-    with pytest.raises(InvalidSettings, match="study s, no gaze on its 1 AOIs brings about the gaze class distracted"):
+    with pytest.raises(InvalidSettings, match="study s, no gaze on its 1 AOIs produces the gaze class distracted"):
         classes_reached(one, ["distracted"])
 
 
-def test_a_plan_is_the_same_every_time_and_nothing_where_nothing_is_to_be_done() -> None:
+def test_plan_is_deterministic_and_empty_if_the_class_is_present() -> None:
     study = study_with(3)
     observation = core.observation_of
     session = Session(

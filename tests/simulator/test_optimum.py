@@ -1,4 +1,4 @@
-"""The exact optimum: known values, a naive recursion, and that nobody beats it."""
+"""The exact optimum equals known values, a naive recursion, and the reward of the best learner."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ STUDY = Study(study="s")
 
 
 @pytest.mark.parametrize(("name", "known"), [("A", 52.7), ("B", 50.0), ("C", 10.3), ("D", 10.0)])
-def test_the_optimum_of_the_papers_users(name: str, known: float) -> None:
+def test_optimum_of_the_papers_users_has_known_values(name: str, known: float) -> None:
     assert optimum(paper_user(name), STUDY, 100) == pytest.approx(known, abs=0.05)
 
 
 def naive_optimum(user: User, episodes: int) -> float:
-    """By recursion over sessions: capacity, previous action, gaze, awareness of each task."""
+    """Return the optimum by recursion over capacity, previous action, gaze and awareness of each task."""
     s, cost = STUDY.capacity, action_costs(STUDY.capacity, STUDY)
     size = float(np.mean([exp(-0.1 * t) for t in (4, 5, 6, 7, 8)]))
 
@@ -52,21 +52,21 @@ def naive_optimum(user: User, episodes: int) -> float:
     return value(1, s.start, -1, 2, (0,) * user.tasks)
 
 
-def test_it_is_what_a_recursion_over_everything_finds() -> None:
+def test_optimum_equals_a_recursion_over_all_states() -> None:
     table = np.random.default_rng(2).random((30, 6)).tolist()
     change = [{"at": 1, "success": np.random.default_rng(3).random((30, 6)).tolist()}]
     user = User.model_validate({"user": "x", "success": table, "changes": change, "tasks": 2, "gaze": {"keep": 0.5}})
     assert optimum(user, STUDY, 3) == pytest.approx(naive_optimum(user, 3), rel=1e-12)
 
 
-def test_following_the_scoring_system_is_the_optimum_with_user_a_up_to_luck() -> None:
+def test_scoring_learner_reaches_the_optimum_with_user_a() -> None:
     rewards = rewards_of("scoring", paper_user("A"), 1, 400)[-1]
     assert rewards.mean() == pytest.approx(optimum(paper_user("A"), STUDY, 100), abs=4 * rewards.std() / 20)
 
 
-def test_a_true_capacity_that_differs_is_part_of_the_state() -> None:
-    untiring = paper_user("B").model_dump() | {"capacity": {"demanding_cost": 0.05}}  # B wants low capacity
-    assert optimum(User.model_validate(untiring), STUDY, 30) < optimum(paper_user("B"), STUDY, 30) - 0.3
+def test_different_true_capacity_is_part_of_the_state() -> None:
+    tireless = paper_user("B").model_dump() | {"capacity": {"demanding_cost": 0.05}}  # B succeeds more at low capacity
+    assert optimum(User.model_validate(tireless), STUDY, 30) < optimum(paper_user("B"), STUDY, 30) - 0.3
 
 
 def test_too_many_states_are_refused() -> None:

@@ -1,4 +1,4 @@
-"""The planner live, one event at a time through the cores, takes the decisions that its batched form takes."""
+"""The planner makes the same decisions in the cores, one event at a time, as in its batched form."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from support.agreement import check_agreement
 PLANNER = Study.model_validate({"study": "s", "learner": {"name": "planner"}})
 
 
-def test_planning_for_many_runs_at_once_takes_the_decisions_of_the_live_learner() -> None:
+def test_batched_planner_agrees_with_the_live_learner() -> None:
     check_agreement(paper_user("B"), PLANNER, runs=2, episodes=100)
 
 
-def test_also_where_the_person_changes_and_its_true_capacity_differs() -> None:
+def test_batched_planner_agrees_for_a_person_with_changes_and_own_capacity() -> None:
     user = paper_user("D").model_dump() | {
         "capacity": {"recovery": 0.1},
         "changes": [{"at": 10, "success": paper_user("A").success}],

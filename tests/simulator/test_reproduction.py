@@ -1,4 +1,4 @@
-"""Table II and users A to D: measures recomputed naively, and the frozen criterion on several seeds."""
+"""Table II and users A to D: naive computation of the measures, and the frozen criterion on several seeds."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def naive_crossing(mean: list[float]) -> int | None:
     return last + 1 if last < len(mean) else None
 
 
-def test_z_and_the_crossing_are_what_a_loop_finds() -> None:
+def test_z_and_crossing_equal_those_of_a_loop() -> None:
     curves = np.cumsum(np.random.default_rng(0).normal(0.02, 1, (100, 40)), axis=0)
     assert zero_crossings(curves).tolist() == [naive_z(curve) for curve in curves.T.tolist()]
     for curve in curves.T:
         assert crossing(curve[:, None]) == naive_crossing(curve.tolist())
 
 
-def test_row_2_is_what_the_cores_give_session_by_session() -> None:
+def test_row_2_equals_sessions_of_the_cores() -> None:
     runs = 4
     rewards = [
         list(play(paper_user("A"), Study(study="s"), session_seed(9, run), 100))[-1].performance.cumulative_reward
@@ -51,15 +51,15 @@ def test_at_least_two_of_three_seeds_pass_the_whole_criterion() -> None:
     assert sum(verdicts) >= 2
 
 
-def test_the_criterion_fails_where_the_numbers_do() -> None:
+def test_criterion_fails_with_too_few_runs() -> None:
     result = table2(0, 3)
     assert len(result["criterion"]) == 6
-    assert not passed(result["criterion"])  # three runs are no reproduction
+    assert not passed(result["criterion"])  # three runs are too few to reproduce the paper
     assert [s.row for s in PAPER] == list(range(1, 13))
     assert len(CROSSINGS) == 8
 
 
-def test_the_same_seed_gives_the_same_numbers() -> None:
+def test_same_seed_gives_the_same_numbers() -> None:
     assert table2(4, 10) == table2(4, 10)
     assert users(4, 10) == users(4, 10)
     assert users(4, 10) != users(5, 10)

@@ -1,4 +1,4 @@
-"""Simulated users: the paper's four by their words, user files and their mistakes."""
+"""Simulated users: the paper's four users, user files and their mistakes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from shift_model.vocabulary import TRIPLES
 from shift_schemas.errors import InvalidSettings
-from shift_simulator.simulated_person import person, task_names
+from shift_simulator.simulated_person import create_person, task_names
 from shift_simulator.users import User, paper_user, parse_user, true_capacity
 from shift_study.scoring import reduce
 from shift_study.scoring_table import ScoringSettings
@@ -24,7 +24,7 @@ def text(**changes: Any) -> str:
 
 
 @pytest.mark.parametrize("name", ["A", "B", "C", "D"])
-def test_the_papers_users_do_what_the_paper_says_of_them(name: str) -> None:
+def test_papers_users_follow_their_description(name: str) -> None:
     table = np.array(paper_user(name).success)
     for t, triple in enumerate(TRIPLES):
         for a, (negation, _) in enumerate(SCORING.actions):
@@ -38,20 +38,20 @@ def test_the_papers_users_do_what_the_paper_says_of_them(name: str) -> None:
             assert table[t, a] == right
 
 
-def test_a_user_file_needs_only_a_name_and_a_table() -> None:
+def test_user_file_needs_only_a_name_and_a_table() -> None:
     user = parse_user(text())
     assert (user.tasks, user.gaze.keep, user.changes) == (3, 0.3, [])
     assert true_capacity(user, STUDY) == STUDY.capacity
 
 
-def test_a_change_holds_after_that_many_interactions() -> None:
+def test_change_takes_effect_after_the_given_interactions() -> None:
     user = parse_user(text(changes=[{"at": 50, "success": [[1] * 6] * 30}]))
     assert user.table_at(50)[0, 0] == 0.5
     assert user.table_at(51)[0, 0] == 1.0
 
 
 @pytest.mark.parametrize(
-    ("mistake", "said"),
+    ("mistake", "message"),
     [
         (text(success=[[2.0] * 6] * 30), "success.0.0 is 2.0: Input should be less than or equal to 1"),
         (text(success=[[0.5] * 5] * 30), "at least 6 items"),
@@ -68,24 +68,24 @@ def test_a_change_holds_after_that_many_interactions() -> None:
         ('{"user": "x"}', "success is missing"),
     ],
 )
-def test_a_mistake_in_a_user_file_names_the_place_the_value_and_the_rule(mistake: str, said: str) -> None:
+def test_mistake_in_a_user_file_is_refused_with_place_value_and_rule(mistake: str, message: str) -> None:
     with pytest.raises(InvalidSettings, match=r"^me\.json: ") as e:
         parse_user(mistake, "me.json")
-    assert said in e.value.detail
+    assert message in e.value.detail
 
 
-def test_a_true_capacity_that_contradicts_the_study_is_refused() -> None:
+def test_true_capacity_that_contradicts_the_study_is_refused() -> None:
     user = parse_user(text(capacity={"start": 3.0}))
     with pytest.raises(InvalidSettings, match="min <= start <= max"):
         true_capacity(user, STUDY)
 
 
-def test_an_unknown_built_in_user_is_refused_with_those_that_there_are() -> None:
+def test_unknown_built_in_user_is_refused_with_the_known_names() -> None:
     with pytest.raises(InvalidSettings, match="no built-in user 'E'; write one of A, B, C, D"):
         paper_user("E")
 
 
-def test_tasks_are_the_studys_and_must_suffice() -> None:
+def test_too_few_tasks_in_the_study_are_refused() -> None:
     user = User.model_validate(json.loads(text()))
     assert task_names(user, STUDY) == ["task-1", "task-2", "task-3"]
     assert task_names(user, Study(study="s", tasks=["a", "b", "c", "d"])) == ["a", "b", "c"]
@@ -93,9 +93,9 @@ def test_tasks_are_the_studys_and_must_suffice() -> None:
         task_names(user, Study(study="s", tasks=["a"]))
 
 
-def test_outcomes_deviate_by_a_fair_coin_in_one_of_twenty() -> None:
+def test_fair_coin_decides_one_outcome_in_twenty() -> None:
     right = TRIPLES[29]
     action = reduce(SCORING, right).action
-    outcomes = [person(paper_user("A"), STUDY, seed).perform(1, right, action) for seed in range(4000)]
+    outcomes = [create_person(paper_user("A"), STUDY, seed).perform(1, right, action) for seed in range(4000)]
     assert np.mean([o.success for o in outcomes]) == pytest.approx(0.975, abs=0.01)
     assert {o.comprehension_s for o in outcomes} == {4.0, 5.0, 6.0, 7.0, 8.0}

@@ -13,8 +13,7 @@ import pytest
 from shift_recording.checksum import checksum_path
 from shift_recording.mcap.reader import RecordedMessage, Recording
 from shift_schemas.errors import UnknownThing
-from shift_study.patching import merge_patch
-from shift_verify.recorder import merge_patch_between
+from shift_study.patching import merge_patch, merge_patch_between
 from shift_verify.verify import verify
 from support.verify_sessions import Edit, Session, changed, rewritten, without
 

@@ -44,9 +44,9 @@ def simulate(
     shift-mesh simulate --user docs/examples/my-user.json --learner scoring --json
     """
     from shift_runtime.rest_client import RestClient
-    from shift_simulator.user_files import user_named
+    from shift_simulator.user_files import find_user
 
-    known = user_named(user)
+    known = find_user(user)
     name = session or f"simulated-{secrets.token_hex(4)}"
     study = {"study": "simulated", "interactions": episodes} | ({"learner": {"name": learner}} if learner else {})
     with RestClient(url) as shift:

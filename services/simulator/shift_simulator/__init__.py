@@ -1,7 +1,7 @@
-"""The simulator: people who are not there, experiments with them, and the exact best that is possible.
+"""The simulator: simulated persons, experiments with them, and the exact optimum.
 
-Where Gymnasium was imported before, importing this package makes ``shift/Partner-v0`` known to it; importing
-``shift_simulator.env`` does so in any case. Gymnasium is an optional extra, and is not imported for its own sake.
+If Gymnasium is already imported, importing this package registers ``shift/Partner-v0``. Importing
+``shift_simulator.env`` always registers it. Gymnasium is an optional extra, so this module does not import it.
 """
 
 import sys

@@ -1,7 +1,7 @@
 """``python -m shift_simulator``: the simulated person of ``shift-mesh up --demo``, in session ``demo``.
 
-User B of the paper, an interaction every other second, for as long as the mesh runs. When the session
-has been ended, the next one is ``demo-2`` and so on.
+By default it is user B of the paper, with one interaction every two seconds, for as long as the mesh runs. If the
+session has ended, the person continues in ``demo-2``, and so on.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ log = structlog.get_logger()
 
 
 class DemoSettings(MeshSettings):
-    """Where the gateway is, and how fast the person works."""
+    """Settings of the simulated person: the gateway, the pace and the user."""
 
-    url: str = Field(default="http://127.0.0.1:8080", description="The gateway.")
-    demo: bool = Field(default=True, description="Whether there is a simulated person at all.")
+    url: str = Field(default="http://127.0.0.1:8080", description="The address of the gateway.")
+    demo: bool = Field(default=True, description="Whether the simulated person is switched on.")
     demo_every_s: float = Field(default=2.0, gt=0, le=3600, description="Seconds between interactions.")
     demo_user: Literal["A", "B", "C", "D"] = Field(default="B", description="Which of the paper's users: A, B, C or D.")
 
 
 def main() -> None:
-    """Interact until SIGINT or SIGTERM."""
+    """Interact with the mesh until SIGINT or SIGTERM."""
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -44,7 +44,7 @@ def main() -> None:
         assert isinstance(settings, DemoSettings)
         configure_logs("simulator", settings)
         if settings.demo:
-            _live(settings, stop)
+            _run_sessions(settings, stop)
         else:
             log.info("the simulated person is switched off by SHIFT_DEMO")
             stop.wait()
@@ -53,7 +53,7 @@ def main() -> None:
         sys.exit(2)
 
 
-def _live(settings: DemoSettings, stop: threading.Event) -> None:
+def _run_sessions(settings: DemoSettings, stop: threading.Event) -> None:
     number = 1
     while not stop.is_set():
         session = "demo" if number == 1 else f"demo-{number}"

@@ -1,8 +1,8 @@
 """Many simulated sessions at once (docs/model.md, sections 1 and 5), as numpy arrays over runs.
 
-Pure. The equations are those of ``shift_model``, which the services' cores use too; a test runs both, event by
+Pure. The equations are those of ``shift_model``, which the services' cores use too. A test runs both, event by
 event, and compares every triple, action and reward. Awareness follows the last result (window 1), as in the
-paper's simulation; a study with another window is refused.
+paper's simulation. A study with another window is refused.
 """
 
 from __future__ import annotations
@@ -154,6 +154,6 @@ def reward_table(settings: RewardSettings) -> Floats:
 def check_simulable(study: Study) -> None:
     """Raise :class:`InvalidSettings` for a study that the tables of simulated users do not fit."""
     if len(study.scoring.actions) != ACTIONS:
-        raise InvalidSettings(f"simulated users know {ACTIONS} actions; the study has {len(study.scoring.actions)}")
+        raise InvalidSettings(f"simulated users have {ACTIONS} actions; the study has {len(study.scoring.actions)}")
     if study.awareness.window != 1 or study.awareness.threshold == 0:
         raise InvalidSettings("simulating many runs at once needs awareness.window 1 and awareness.threshold above 0")

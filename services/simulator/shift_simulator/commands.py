@@ -1,7 +1,7 @@
-"""``shift-mesh evaluate``: the paper reproduced, and learners compared. A Typer app for the command line.
+"""``shift-mesh evaluate``: reproduce the paper and compare learners. A Typer app for the command line.
 
-With ``--json`` one document goes to standard output and nothing else; progress goes to standard error. Exit
-codes: 0 fine, 1 the criterion does not hold, 2 wrong use.
+With ``--json``, standard output has exactly one JSON document. Progress goes to standard error. Exit codes: 0 for
+success, 1 if the criterion does not hold, 2 for wrong use.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ app = typer.Typer(
 
 Runs = Annotated[int, typer.Option(help="Simulated sessions per row.", envvar="SHIFT_RUNS", min=2, max=1_000_000)]
 Seed = Annotated[int, typer.Option(help="Seed of the experiment.", envvar="SHIFT_SEED", min=0, max=2**53 - 1)]
-Out = Annotated[Path | None, typer.Option(help="Folder for the JSON and the figures.", envvar="SHIFT_OUT")]
-Json = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.", envvar="SHIFT_JSON")]
+Out = Annotated[Path | None, typer.Option(help="Folder for the JSON file and the figures.", envvar="SHIFT_OUT")]
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document.", envvar="SHIFT_JSON")]
 
 
 @app.command()
 def table2(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = False) -> None:
-    """The paper's Table II beside ours, and the verdict on points 1 to 3 of the frozen criterion.
+    """Compute the paper's Table II, compare it with the paper, and check points 1 to 3 of the criterion.
 
     \b
     shift-mesh evaluate table2
@@ -42,13 +42,13 @@ def table2(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fa
     _make_folder(out)
     with _progress("twelve rows"):
         result = experiment.table2(seed, runs)
-    _put_out("table2", result, out, as_json, report.print_table2)
-    _judge(result)
+    _output("table2", result, out, as_json, report.print_table2)
+    _exit_by_criterion(result)
 
 
 @app.command()
 def users(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = False) -> None:
-    """Users A to D with and without the scoring prior: crossings, rewards, figure, point 4 of the criterion.
+    """Simulate users A to D with and without the scoring prior, and check point 4 of the criterion.
 
     \b
     shift-mesh evaluate users
@@ -61,19 +61,19 @@ def users(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fal
         result = user_study.users(seed, runs)
     if out is not None:
         user_study.draw_users(result, out)
-    _put_out("users", result, out, as_json, report.print_users)
-    _judge(result)
+    _output("users", result, out, as_json, report.print_users)
+    _exit_by_criterion(result)
 
 
 @app.command()
 def learners(
     learner: Annotated[
         list[str] | None,
-        typer.Option(help=f"{LEARNER_HELP} Repeatable; left out: all.", envvar="SHIFT_LEARNER", callback=check_learner),
+        typer.Option(help=f"{LEARNER_HELP} Repeatable; default: all.", envvar="SHIFT_LEARNER", callback=check_learner),
     ] = None,
     user: Annotated[
         list[str] | None,
-        typer.Option(help=f"{USER_HELP} Repeatable; left out: A to D.", envvar="SHIFT_USER", metavar=USER_METAVAR),
+        typer.Option(help=f"{USER_HELP} Repeatable; default: A to D.", envvar="SHIFT_USER", metavar=USER_METAVAR),
     ] = None,
     runs: Runs = 200,
     seed: Seed = 0,
@@ -83,7 +83,7 @@ def learners(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Reward, break-even, regret and worst dip of learners with users.
+    """Compare learners on simulated users: reward, break-even, regret and worst dip.
 
     \b
     shift-mesh evaluate learners --regret
@@ -92,20 +92,20 @@ def learners(
     from shift_learner.learners import LEARNERS
 
     from shift_simulator import compare, report
-    from shift_simulator.user_files import user_named
+    from shift_simulator.user_files import find_user
 
     names = learner or list(LEARNERS)
-    people = [user_named(name) for name in user or ("A", "B", "C", "D")]
+    people = [find_user(name) for name in user or ("A", "B", "C", "D")]
     _make_folder(out)
-    with _progress("learners") as said:
-        result = compare.compare(names, people, seed, runs, regret, said)
+    with _progress("learners") as report_progress:
+        result = compare.compare(names, people, seed, runs, regret, report_progress)
     if out is not None:
         compare.draw_learners(result, out)
-    _put_out("learners", result, out, as_json, report.print_learners)
+    _output("learners", result, out, as_json, report.print_learners)
 
 
 def _make_folder(out: Path | None) -> None:
-    """Make the folder for the results before anything is computed, so that a wrong path costs no waiting."""
+    """Make the folder for the results before the computation, so that a wrong path fails at once."""
     if out is None:
         return
     from shift_schemas.errors import InvalidSettings
@@ -113,19 +113,19 @@ def _make_folder(out: Path | None) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as e:
-        raise InvalidSettings(f"--out is {out}: this folder cannot be made: {e.strerror}; give another one") from e
+        raise InvalidSettings(f"--out is {out}: this folder cannot be created: {e.strerror}; give another one") from e
     if not os.access(out, os.W_OK):
-        raise InvalidSettings(f"--out is {out}: this folder cannot be written; give another one")
+        raise InvalidSettings(f"--out is {out}: this folder is not writable; give another one")
 
 
 @contextmanager
-def _progress(what: str) -> Iterator[Callable[[str], None]]:
-    """A spinner on standard error that can be told what is being done."""
-    with Console(stderr=True).status(what) as status:
+def _progress(text: str) -> Iterator[Callable[[str], None]]:
+    """Show a spinner on standard error; yield the function that changes its text."""
+    with Console(stderr=True).status(text) as status:
         yield status.update
 
 
-def _put_out(
+def _output(
     name: str, result: dict[str, Any], out: Path | None, as_json: bool, show: Callable[[dict[str, Any], Console], None]
 ) -> None:
     if out is not None:
@@ -136,7 +136,7 @@ def _put_out(
         show(result, Console(width=None if Console().is_terminal else 140))
 
 
-def _judge(result: dict[str, Any]) -> None:
+def _exit_by_criterion(result: dict[str, Any]) -> None:
     from shift_simulator.criterion import passed
 
     raise typer.Exit(0 if passed(result["criterion"]) else 1)

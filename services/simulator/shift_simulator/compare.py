@@ -1,4 +1,4 @@
-"""Learners compared on users: reward, break-even, regret and worst dip, with standard errors."""
+"""The comparison of learners: reward, break-even, regret and worst dip, with standard errors."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from shift_simulator.users import User
 
 Progress = Callable[[str], None]
 INTERVAL = 1.96
-"""Standard errors on either side of a mean: 95 % of a normal distribution."""
+"""Half the width of a 95 % interval, in standard errors of a normal distribution."""
 
 
 def compare(
-    names: Sequence[str], people: Sequence[User], seed: int, runs: int, regret: bool, said: Progress
+    names: Sequence[str], people: Sequence[User], seed: int, runs: int, regret: bool, report_progress: Progress
 ) -> dict[str, Any]:
-    """Every learner on every user, all on the same sessions (INTERFACE.md, "Command line").
+    """Return the results of every learner with every user on the same sessions (docs/interface.md, "Command line").
 
-    ``regret_mean`` is the exact optimum of the user (``optimum``) less the mean reward, else None; its standard
-    error is the reward's. ``reward_low`` and ``reward_high`` are the 10th and the 90th percentile of the runs.
-    ``curves`` holds the mean cumulative reward after each episode, and ``low`` and ``high``, the ends of its 95 %
-    interval.
+    ``regret_mean`` is the exact optimum of the user (``optimum``) minus the mean reward, or None without ``regret``.
+    Its standard error is that of the reward. ``reward_low`` and ``reward_high`` are the 10th and the 90th percentile
+    of the runs. ``curves`` holds the mean cumulative reward after each episode, with the ends ``low`` and ``high`` of
+    its 95 % interval.
     """
     results, curves = [], []
     for user in people:
         best = optimum(user, Study(study="learners"), EPISODES) if regret else None
         for name in names:
-            said(f"{name} with user {user.user}")
+            report_progress(f"{name} with user {user.user}")
             cumulative = rewards_of(name, user, seed, runs)
             results.append({"learner": name, "user": user.user} | _summary(cumulative, best))
             curves.append({"learner": name, "user": user.user} | _curve(cumulative))
@@ -45,7 +45,7 @@ def compare(
 
 
 def rewards_of(name: str, user: User, seed: int, runs: int, episodes: int = EPISODES) -> Floats:
-    """Cumulative reward [episodes, runs] of a learner with its default settings."""
+    """Return the cumulative reward [episodes, runs] of a learner with its default settings."""
     study = Study.model_validate({"study": "learners", "learner": {"name": name}})
     learner = batch_learner(Context(study), runs)
     return simulate(user, study, learner, session_seeds(seed, runs), episodes).cumulative
@@ -76,11 +76,11 @@ def _curve(cumulative: Floats) -> dict[str, Any]:
 
 
 def draw_learners(result: dict[str, Any], out_dir: Path) -> list[Path]:
-    """Draw two panels per user, as PNG and SVG: the mean curves, and the final rewards with the spread of the runs.
+    """Draw two panels for each user, as PNG and SVG: mean curves, and final rewards with the spread of the runs.
 
-    Learners that do alike coincide in the first; in the second each has a line of its own.
+    Curves of similar learners coincide in the first panel. In the second panel each learner has its own line.
     """
-    from shift_simulator.figures import STYLES, draw_curve, finish, label_panels, on_one_scale, panels, saved
+    from shift_simulator.figures import STYLES, draw_curve, finish, label_panels, on_one_scale, panels, save_figure
 
     users = list(dict.fromkeys(c["user"] for c in result["curves"]))
     learners = list(dict.fromkeys(c["learner"] for c in result["curves"]))
@@ -91,8 +91,8 @@ def draw_learners(result: dict[str, Any], out_dir: Path) -> list[Path]:
             turn = learners.index(curve["learner"])
             draw_curve(above, curve, STYLES[turn % len(STYLES)], turn, len(learners), curve["learner"])
         for row in (r for r in result["results"] if r["user"] == user):
-            turn = learners.index(row["learner"])
-            _draw_end(below, row, STYLES[turn % len(STYLES)], turn)
+            place = learners.index(row["learner"])
+            _draw_end(below, row, STYLES[place % len(STYLES)], place)
         above.axhline(0, color="black", linewidth=0.5)
         below.axvline(0, color="black", linewidth=0.5)
     at_the_end[0].set_yticks(range(len(learners)), learners)
@@ -107,7 +107,7 @@ def draw_learners(result: dict[str, Any], out_dir: Path) -> list[Path]:
         f"of its own; band: 95 % interval of the mean (± {INTERVAL} standard errors). Below: reward after {episodes} "
         "episodes; bar: the middle 80 % of the runs (10th to 90th percentile).",
     )
-    return saved(figure, out_dir, "learners")
+    return save_figure(figure, out_dir, "learners")
 
 
 def _draw_end(ax: Any, row: dict[str, Any], style: Any, place: int) -> None:

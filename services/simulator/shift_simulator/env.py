@@ -1,8 +1,8 @@
 """The simulated partner as a Gymnasium environment: ``gymnasium.make("shift/Partner-v0", user="B")``.
 
-For agents from outside. Gymnasium is an optional extra. Importing this module registers the environment, as does
-``import shift_simulator`` after ``import gymnasium``; ``gymnasium.make("shift_simulator.env:shift/Partner-v0")`` does
-both at once.
+It is for agents from outside the project. Gymnasium is an optional extra. Importing this module registers the
+environment, and so does ``import shift_simulator`` after ``import gymnasium``.
+``gymnasium.make("shift_simulator.env:shift/Partner-v0")`` imports, registers and makes the environment.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from shift_simulator.users import ACTIONS, PAPER_USERS, User, paper_user, parse_
 
 
 class PartnerEnv(gymnasium.Env[np.int64, np.int64]):
-    """A simulated partner who is explained tasks to.
+    """A simulated partner who listens to explanations of tasks.
 
     ## Description
-    An agent chooses how each explanation is phrased; the partner succeeds with the task or fails. Capacity, gaze
-    and awareness move as in the paper's simulation (``dynamics``); the agent sees them as the decider does.
+    An agent chooses how each explanation is phrased. Then the partner succeeds or fails in the task. Capacity, gaze
+    and awareness change as in the paper's simulation (``batched_sessions``). The agent sees what the decider sees.
 
     ## Action space
     ``Discrete(6)``: (affirmation, none), (affirmation, hesitation), (negation+affirmation, none),
@@ -39,17 +39,17 @@ class PartnerEnv(gymnasium.Env[np.int64, np.int64]):
     ``observation="states"``: the cognitive state, which is the scoring system's suggested action.
 
     ## Rewards
-    The paper's: success (+1, -1) x exp(-0.1 T), the mean of both dimensions.
+    The paper's reward: success (+1, -1) x exp(-0.1 T), as the mean of both dimensions.
 
     ## Starting state
-    High capacity, focused, nothing known of any task.
+    High capacity, focused gaze, and unknown awareness for every task.
 
     ## Episode end
-    Truncated after ``episodes`` interactions; it never terminates. ``info`` has the ``triple`` by its name and the
-    ``suggested`` action.
+    An episode is truncated after ``episodes`` interactions. It never terminates. ``info`` holds the name of the
+    ``triple`` and the ``suggested`` action.
 
     ## Arguments
-    ``user``: A, B, C, D, a user file's path or a ``User``; ``observation``; ``episodes``.
+    ``user``: A, B, C, D, the path of a user file or a ``User``. ``observation`` and ``episodes``: see above.
     """
 
     metadata = {"render_modes": []}  # noqa: RUF012 (Gymnasium's own attribute)
@@ -74,21 +74,21 @@ class PartnerEnv(gymnasium.Env[np.int64, np.int64]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.int64, dict[str, Any]]:
-        """A new session; its seed is draws_of from the environment's generator."""
+        """Start a new session; the environment's generator draws its seed."""
         super().reset(seed=seed)
         seeds = self.np_random.integers(2**53, size=1)
         self._partners = BatchedPersons(self._user, self._study, draws_of(seeds, self._episodes + 1))
         self._done = 0
-        return self._seen()
+        return self._observe()
 
     def step(self, action: np.int64) -> tuple[np.int64, float, bool, bool, dict[str, Any]]:
-        """Explain with this action; what comes next."""
+        """Explain with this action; return the next observation, the reward and the end of the episode."""
         reward = self._partners.perform(self._done, np.array([int(action)]))
         self._done += 1
-        observation, info = self._seen()
+        observation, info = self._observe()
         return observation, float(reward[0]), False, self._done >= self._episodes, info
 
-    def _seen(self) -> tuple[np.int64, dict[str, Any]]:
+    def _observe(self) -> tuple[np.int64, dict[str, Any]]:
         triple = int(self._partners.triple(self._done)[0])
         suggested = self._suggested[triple]
         info = {"triple": TRIPLES[triple].name, "suggested": suggested}
@@ -102,7 +102,7 @@ def _user(user: str | User) -> User:
 
 
 def register() -> None:
-    """Make the environment known to Gymnasium; a second time changes nothing."""
+    """Register the environment with Gymnasium; a repeat changes nothing."""
     if ENV_ID not in gymnasium.registry:
         gymnasium.register(id=ENV_ID, entry_point="shift_simulator.env:PartnerEnv")
 

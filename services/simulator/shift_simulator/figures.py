@@ -1,8 +1,9 @@
-"""Figures without a screen (matplotlib's Agg), the same bytes for the same numbers.
+"""Figures without a screen (matplotlib's Agg). The same numbers give the same bytes.
 
-A figure is as wide as a column of a paper, and no text in it is smaller than 8 points. It says itself what its lines,
-bands and bars are and of how many runs. Colours are those of Okabe and Ito, which people with colour blindness tell
-apart; dashes and markers tell the curves apart without colour, and the markers of curves that coincide take turns.
+A figure is as wide as one column of a paper, and its smallest text has 8 points. Its caption says what the lines,
+bands and bars are, and how many runs they show. The colours are those of Okabe and Ito, which people with colour
+blindness can tell apart. Dashes and markers tell the curves apart without colour. Where curves coincide, their
+markers alternate.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ matplotlib.use("Agg")
 matplotlib.rcParams.update(
     {
         "svg.hashsalt": "shift",
-        "svg.fonttype": "none",  # text stays text: it can be read, searched and tested
+        "svg.fonttype": "none",  # keep text as text, so that people can search it and tests can read it
         "font.size": 8,
         "axes.titlesize": 8,
         "axes.labelsize": 8,
@@ -30,17 +31,17 @@ matplotlib.rcParams.update(
     }
 )
 
-from matplotlib.figure import Figure  # noqa: E402 (the backend comes first)
+from matplotlib.figure import Figure  # noqa: E402 (the backend must be chosen first)
 
 WIDTH_IN = 3.5
-"""A column of a two-column paper, inches."""
+"""The width of a column in a two-column paper, inches."""
 CAPTION_CHARACTERS = 60
-"""So many characters of 8 points fit into the width."""
+"""How many characters of 8 points fit into the width."""
 TITLE_CHARACTERS = 20
 
 
 class Style(NamedTuple):
-    """How a curve looks."""
+    """The style of a curve."""
 
     colour: str
     dash: Any
@@ -56,27 +57,27 @@ STYLES: tuple[Style, ...] = (
     Style("#E69F00", (0, (4, 1, 1, 1, 1, 1)), "v"),
     Style("#56B4E9", (0, (8, 2)), "*"),
 )
-"""Okabe and Ito (2008) without their yellow, which is hard to see on white; as many as there are learners."""
+"""The colours of Okabe and Ito (2008) without yellow, which is hard to see on white. Each learner has a style."""
 
 
 def panels(count: int, *heights: float) -> tuple[Any, list[list[Any]]]:
-    """Return a figure with ``count`` panels two side by side, for each of ``heights`` (inches) another set of them."""
+    """Return a figure, and ``count`` panels in two columns for each of ``heights`` (inches)."""
     columns = min(2, count)
     rows = ceil(count / columns)
     ratios = [height for height in heights for _ in range(rows)]
     figure = Figure(figsize=(WIDTH_IN, sum(ratios) + 1.1), layout="constrained")
     axes = figure.subplots(len(ratios), columns, squeeze=False, height_ratios=ratios)
-    found = []
+    groups = []
     for kind in range(len(heights)):
-        mine = list(axes[kind * rows : (kind + 1) * rows].flat)
-        for spare in mine[count:]:
+        group = list(axes[kind * rows : (kind + 1) * rows].flat)
+        for spare in group[count:]:
             spare.remove()
-        found.append(mine[:count])
-    return figure, found
+        groups.append(group[:count])
+    return figure, groups
 
 
 def on_one_scale(axes: Sequence[Any]) -> None:
-    """Give the panels the same axes; numbers stand at the left ones only."""
+    """Give the panels the same axes, with numbers only at the left panels."""
     for i, ax in enumerate(axes[1:], 1):
         ax.sharey(axes[0])
         ax.sharex(axes[0])
@@ -84,9 +85,9 @@ def on_one_scale(axes: Sequence[Any]) -> None:
 
 
 def draw_curve(ax: Any, curve: dict[str, Any], style: Style, turn: int, turns: int, label: str) -> None:
-    """Draw ``mean`` over the episodes with the band from ``low`` to ``high``.
+    """Draw ``mean`` over the episodes, with the band from ``low`` to ``high``.
 
-    ``turn`` of ``turns`` moves the markers, so that each of several curves that coincide shows its own.
+    Curve ``turn`` of ``turns`` has its markers moved, so that the markers of coinciding curves stay visible.
     """
     episodes = range(1, len(curve["mean"]) + 1)
     period = max(turns, len(episodes) // 4)
@@ -105,7 +106,7 @@ def finish(figure: Any, ax: Any, caption: str) -> None:
 
 
 def label_panels(axes: Sequence[Any], names: Sequence[str], x: str, y: str) -> None:
-    """Title each panel by its user; label the axes at the left and at the bottom."""
+    """Give each panel its user as the title, and label the left and the bottom axes."""
     columns = min(2, len(axes))
     for i, (ax, name) in enumerate(zip(axes, names, strict=True)):
         short = name if len(name) <= TITLE_CHARACTERS else f"{name[: TITLE_CHARACTERS - 1]}…"
@@ -116,8 +117,8 @@ def label_panels(axes: Sequence[Any], names: Sequence[str], x: str, y: str) -> N
             ax.set_ylabel(y)
 
 
-def saved(figure: Any, out_dir: Path, name: str) -> list[Path]:
-    """Save the figure as ``name.png`` and ``name.svg`` in ``out_dir``."""
+def save_figure(figure: Any, out_dir: Path, name: str) -> list[Path]:
+    """Save the figure as ``name.png`` and ``name.svg`` in ``out_dir``; return both paths."""
     out_dir.mkdir(parents=True, exist_ok=True)
     png, svg = out_dir / f"{name}.png", out_dir / f"{name}.svg"
     figure.savefig(png, dpi=250, metadata={"Software": None})

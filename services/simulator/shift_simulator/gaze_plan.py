@@ -1,16 +1,16 @@
-"""Gaze that brings a gaze class about: where to look, and for how long, until the monitor says so.
+"""Plans of gaze: which AOIs to look at, and for how long, so that the monitor computes a wanted gaze class.
 
-Pure, and faster than real time: samples are AOI names on a clock of the simulator's own. The plan is found by
-trying looks out on the monitor's own rules (``shift_monitor.attention``): a steady look, turns between AOIs, and a
-steady look after the turns, each from where attention is now and after a calm look.
+Pure, and faster than real time: samples are AOI names on the simulator's own clock. The search applies candidate
+looks to the monitor's own rules (``shift_monitor.attention``). It tries a steady look, turns between AOIs, and a
+steady look after the turns. It starts from the present attention, and then from the attention after a calm look.
 
-A chunk ends with a sample on no AOI: the last sample of a source has no dwell yet, and so nothing of it is left
-over for the next chunk but ``LEAD_NS`` on nothing, too short to become the held target.
+A chunk ends with a sample on no AOI. The last sample of a source has no dwell yet, so the next chunk adds only
+``LEAD_NS`` on no AOI. That is too short to become the held target.
 
-What cannot be reached, whatever one looks at: with one AOI the dominance is always 1 and the focus shift only
-falls, so a session of it becomes focused and stays so; with two AOIs the dominance is at least 0.5, so both other
-classes need the focus shift to rise (``shift_increase`` above 0); *focused* needs both the weights to move and the
-shift to fall. Then :class:`InvalidSettings` says so.
+No gaze can reach some classes. With one AOI, the dominance is always 1 and the focus shift only falls, so the gaze
+class becomes *focused* and stays so. With two AOIs, the dominance is at least 0.5, so both other classes need a rise
+of the focus shift (``shift_increase`` above 0). *Focused* needs weights that change and a focus shift that falls.
+If a class cannot be reached, the plan is refused with :class:`InvalidSettings`.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from shift_schemas.timestamps import NS
 from shift_study.study import Study
 
 LEAD_NS = 1_000_000
-"""From the end of one chunk to the start of the next, ns; chosen: far below the shortest fixation."""
+"""Time from the end of one chunk to the start of the next, ns; chosen far below the shortest fixation."""
 TURNS = 48
-"""Chosen: more turns between AOIs than it takes from any state with the default settings (8)."""
+"""Largest number of turns between AOIs; chosen above the 8 that any state needs with the default settings."""
 LOOKS = 240
-"""Chosen: more steady looks in a row than it takes from any state with the default settings (20)."""
+"""Largest number of steady looks in a row; chosen above the 20 that any state needs with the default settings."""
 
 
 class Look(NamedTuple):
-    """Gaze on one AOI (its index) for a while."""
+    """Gaze on one AOI (its index) for a duration."""
 
     target: int
     duration_ns: int
 
 
 def plan_gaze(study: Study, view: GazeView, wanted: GazeClass) -> tuple[Look, ...]:
-    """The looks after which the monitor's gaze class is the ``wanted`` one; none where it is that already.
+    """Return the looks after which the monitor's gaze class is ``wanted``; an empty tuple if it already is.
 
     Parameters
     ----------
     view
-        Attention as the newest observation shows it, all earlier gaze of the session being of such plans.
+        The attention in the newest observation. All earlier gaze of the session must come from such plans.
 
     Raises
     ------
@@ -56,11 +56,11 @@ def plan_gaze(study: Study, view: GazeView, wanted: GazeClass) -> tuple[Look, ..
     """
     if view.category == wanted:
         return ()
-    return _searched(study, _attention(study, view), wanted)
+    return _search(study, _attention(study, view), wanted)
 
 
 def chunk_of(study: Study, looks: tuple[Look, ...], source: str, seq: int, clock_ns: int) -> tuple[GazeChunk, int]:
-    """The looks as a chunk that begins ``LEAD_NS`` after ``clock_ns``, and the clock at its end."""
+    """Return the looks as a chunk that begins ``LEAD_NS`` after ``clock_ns``, and the clock at its end."""
     times, names = [], []
     now_ns = clock_ns + LEAD_NS
     longest_ns = round(study.attention.maximum_dwell_s * NS)
@@ -75,24 +75,24 @@ def chunk_of(study: Study, looks: tuple[Look, ...], source: str, seq: int, clock
 # --- the search ---
 
 
-def _searched(study: Study, start: Attention, wanted: GazeClass) -> tuple[Look, ...]:
+def _search(study: Study, start: Attention, wanted: GazeClass) -> tuple[Look, ...]:
     aois = tuple(range(len(study.aois)))
     rings = (aois[:2], aois) if len(aois) > 2 else (aois,)
     for calm in (False, True):
         for ring in rings:
-            for looks, attention in _program(study, start, ring, calm):
+            for looks, attention in _candidates(study, start, ring, calm):
                 if gaze_class(attention, study.attention) == wanted:
                     return looks
     raise InvalidSettings(
-        f"with the attention settings of study {study.study}, no gaze on its {len(aois)} AOIs brings about the gaze "
-        f"class {wanted}; change attention, or give the study two AOIs or more"
+        f"with the attention settings of study {study.study}, no gaze on its {len(aois)} AOIs produces the gaze class "
+        f"{wanted}; change the attention settings, or give the study two or more AOIs"
     )
 
 
-def _program(
+def _candidates(
     study: Study, start: Attention, ring: tuple[int, ...], calm: bool
 ) -> Iterator[tuple[tuple[Look, ...], Attention]]:
-    """What attention becomes: after 0, 1, ... turns through ``ring``, and after each along a steady look."""
+    """Yield candidate looks with the attention after them: 0, 1, ... turns through ``ring``, then a steady look."""
     hold_ns, unit_ns = _hold_ns(study), _unit_ns(study)
     here = start.held if start.held != NOWHERE else start.weights.index(max(start.weights))
     looks: tuple[Look, ...] = ()
@@ -110,7 +110,7 @@ def _program(
 def _steady(
     study: Study, looks: tuple[Look, ...], attention: Attention, target: int, duration_ns: int, times: int
 ) -> tuple[tuple[Look, ...], Attention]:
-    """One look of ``times`` x ``duration_ns`` more, cut as :func:`chunk_of` cuts it."""
+    """Add one look of ``times`` x ``duration_ns``, divided into samples as in :func:`chunk_of`."""
     whole = Look(target, duration_ns * times)
     longest_ns = round(study.attention.maximum_dwell_s * NS)
     until_ns = attention.until_ns or 0
@@ -121,7 +121,7 @@ def _steady(
 
 
 def _attention(study: Study, view: GazeView) -> Attention:
-    """Attention after the lead on nothing that each chunk begins with."""
+    """Return the attention after the time on no AOI at the start of each chunk."""
     held = study.aoi_names.index(view.aoi) if view.aoi else NOWHERE
     weights = tuple(view.weights[name] for name in study.aoi_names)
     dwell_ns = round((view.dwell_s or 0.0) * NS)
@@ -129,10 +129,10 @@ def _attention(study: Study, view: GazeView) -> Attention:
 
 
 def _hold_ns(study: Study) -> int:
-    """How long a look takes to become the held target, as the monitor rounds it."""
+    """Return the time until a look becomes the held target, rounded like the monitor's."""
     return round(study.fixation.minimum_duration_s * NS)
 
 
 def _unit_ns(study: Study) -> int:
-    """A steady look's length: an application of the equations, or what it takes to be held."""
+    """Return the unit of a steady look: the longer of one application of the equations and the time to be held."""
     return max(round(study.attention.step_s * NS), _hold_ns(study))

@@ -1,7 +1,7 @@
-"""Generated users whose reactions differ from the scoring table, for trying learners on more than users A to D.
+"""Generated users whose reactions differ from the scoring table, for tests of learners beyond users A to D.
 
-Pure; each family is a function of a numpy generator, so one seed gives one user. The planner's constants were
-chosen with these users and never with A to D.
+Pure. Each family is a function of a numpy generator, so one seed gives one user. The planner's constants were
+chosen with these users, and never with A to D.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from shift_simulator.random_streams import Bools, Floats, Ints
 from shift_simulator.users import ACTIONS, User
 
 SHAPE = (2, 3, 5)
-"""Classes of capacity, gaze and awareness."""
+"""Numbers of classes of capacity, gaze and awareness."""
 
 
 def flipped(rng: np.random.Generator, entries: int) -> User:
@@ -105,12 +105,12 @@ def _picky(rng: np.random.Generator) -> Floats:
 
 
 def _condition(rng: np.random.Generator) -> Bools:
-    """One to three features must each lie in a random subset of their classes, [30]."""
+    """Return where one to three features each lie in a random subset of their classes, bool [30]."""
     holds = np.ones(SHAPE, dtype=bool)
     for feature in rng.permutation(len(SHAPE))[: rng.integers(1, 4)]:
         classes = rng.random(SHAPE[feature]) < 0.5
         if classes.all() or not classes.any():
             classes[rng.integers(len(classes))] ^= True
         holds &= classes.reshape([-1 if i == feature else 1 for i in range(len(SHAPE))])
-    found: Bools = holds.reshape(-1)
-    return found
+    condition: Bools = holds.reshape(-1)
+    return condition

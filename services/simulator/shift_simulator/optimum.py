@@ -1,10 +1,10 @@
-"""The exact optimum for a simulated user: finite-horizon dynamic programming by someone who knows the user.
+"""The exact optimum for a simulated user, for a policy that knows the user: finite-horizon dynamic programming.
 
-Pure. The state is all that matters to the future: the capacity that is shown (and the true one, where it
-differs), the previous action, the gaze class, the awareness of every task, and the time left. Tasks are alike, so
-awareness counts how many of them are unknown, failed and done (window 1: the simulated outcomes of both
-dimensions are one, so the other two classes do not occur). The values that capacity can take are enumerated, not
-put on a grid. The reward's expectation over durations and coin flips is exact.
+Pure. The state has everything that affects the future: the estimated capacity, the true capacity if it differs, the
+previous action, the gaze class, the awareness of every task, and the time left. Tasks are alike, so the state holds
+only how many of them are unknown, failed and done. The other two awareness classes do not occur, because the window
+is 1 and both dimensions have the same simulated outcome. The values of capacity are enumerated, not put on a grid.
+The expectation of the reward over durations and coin flips is exact.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ UNKNOWN = AWARENESSES.index("unknown")
 SEEN = (UNKNOWN, FAILURE, SUCCESS)
 """The awareness classes that occur, in the order of the counts."""
 MOST_STATES = 2_000_000
-"""Chosen: of capacities, actions, gaze and awareness together; four minutes and 200 MB at most."""
+"""Largest number of states of capacity, action, gaze and awareness; chosen: at most four minutes and 200 MB."""
 
 Counts = tuple[int, int, int]
 
@@ -44,15 +44,15 @@ class CapacityGraph:
     """The reachable pairs of estimated and true capacity with the previous action; node 0 is the start."""
 
     after: NDArray[np.int64]
-    """[nodes, actions]: the node after an action."""
+    """The node after each action, int [nodes, actions]."""
     shown_high: Ints
     true_high: Ints
 
 
 def optimum(user: User, study: Study, episodes: int) -> float:
-    """The largest expected cumulative reward that any policy can have with this user after ``episodes``.
+    """Return the largest expected cumulative reward of any policy with this user after ``episodes``.
 
-    Raises :class:`InvalidSettings` where its states are too many to enumerate.
+    Raises :class:`InvalidSettings` if there are too many states to enumerate.
     """
     check_simulable(study)
     graph = _capacity_graph(user, study)
@@ -62,14 +62,14 @@ def optimum(user: User, study: Study, episodes: int) -> float:
     scale = float(reward_table(study.reward)[1].mean())
     value = np.zeros((len(graph.after), len(GAZES), len(counts)))
     for n in range(episodes, 0, -1):
-        value = _backed_up(value, user, n, graph, counts, scale)
+        value = _back_up(value, user, n, graph, counts, scale)
     return float(value[0, FOCUSED, counts.index((user.tasks, 0, 0))])
 
 
-def _backed_up(value: Floats, user: User, n: int, graph: CapacityGraph, counts: list[Counts], scale: float) -> Floats:
-    """The value before interaction ``n`` from the value after it, [nodes, gaze, counts].
+def _back_up(value: Floats, user: User, n: int, graph: CapacityGraph, counts: list[Counts], scale: float) -> Floats:
+    """Return the value before interaction ``n`` from the value after it, both [nodes, gaze, counts].
 
-    The value before is taken over the task that is drawn: each class in proportion to its count.
+    It is the expectation over the task that is drawn: each awareness class has the share of its count.
     """
     following = user.gaze.keep * value + (1 - user.gaze.keep) * value.mean(axis=1, keepdims=True)
     chance = DEVIATION / 2 + (1 - DEVIATION) * user.table_at(n).reshape(2, len(GAZES), len(AWARENESSES), ACTIONS)
@@ -89,7 +89,7 @@ def _backed_up(value: Floats, user: User, n: int, graph: CapacityGraph, counts: 
 
 
 def _moves(counts: list[Counts], i: int) -> tuple[Ints, Ints, Ints]:
-    """Counts where a task of class ``i`` can be drawn, and the counts after its success and its failure."""
+    """Return the counts from which a task of class ``i`` can be drawn, and the counts after success and failure."""
     drawn = [k for k, c in enumerate(counts) if c[i]]
     moved = []
     for to in (2, 1):
@@ -104,12 +104,12 @@ def _moves(counts: list[Counts], i: int) -> tuple[Ints, Ints, Ints]:
 
 
 def _counts(tasks: int) -> list[Counts]:
-    """How many tasks can be unknown, failed, done."""
+    """Return every possible number of tasks that are unknown, failed and done."""
     return [(u, f, tasks - u - f) for u, f in product(range(tasks + 1), repeat=2) if u + f <= tasks]
 
 
 def _capacity_graph(user: User, study: Study) -> CapacityGraph:
-    """Follow all actions from the start until no new node appears; values that differ by rounding are equal."""
+    """Follow all actions from the start until no new node appears; values equal to 9 decimals are one node."""
     both = (study.capacity, true_capacity(user, study))
     cost = [action_costs(settings, study) for settings in both]
     found: dict[tuple[float, float, int], int] = {(both[0].start, both[1].start, -1): 0}

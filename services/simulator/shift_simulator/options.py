@@ -1,4 +1,4 @@
-"""Options of the command line that take one of some names: learners and users. Imports nothing heavy."""
+"""Command-line options for names of learners and users. The module imports nothing heavy, so that help is fast."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ USER_METAVAR = "A|B|C|D|FILE"
 
 
 def check_learner(value: Any) -> Any:
-    """Return the option's value, one name or a list of them; refuse what is not a learner with those that there are."""
+    """Return the option's value, a name or a list of names; refuse a name that is not a learner."""
     for name in value if isinstance(value, list) else [value] if value is not None else []:
         check_name(name, LEARNER_NAMES, "a learner")
     return value

@@ -1,4 +1,4 @@
-"""Results as tables for people, printed with rich. What is printed is what the JSON holds."""
+"""Tables of the results, printed with rich. They show the values of the JSON document."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from shift_simulator.criterion import Point, passed
 
 
 def print_table2(result: dict[str, Any], console: Console) -> None:
-    """The twelve rows beside the paper's: value, standard error, difference."""
+    """Print the twelve rows: value, standard error, difference from the paper."""
     title = f"Table II, user A, {result['runs']} runs, seed {result['seed']}: ours ± standard error (ours − paper)"
     table = Table("row", "prior", "α", "γ", "Z mean", "Z sd", "R mean", "R sd", title=title)
     for row in result["rows"]:
-        cells = [_beside(row, key, result["runs"]) for key in ("z_mean", "z_sd", "r_mean", "r_sd")]
+        cells = [_cell(row, key, result["runs"]) for key in ("z_mean", "z_sd", "r_mean", "r_sd")]
         prior = "yes" if row["prior"] else "no"
         table.add_row(str(row["row"]), prior, f"{row['learning_rate']:.2f}", f"{row['discount']:.2f}", *cells)
     console.print(table)
     print_criterion(result["criterion"], console)
 
 
-def _beside(row: dict[str, Any], key: str, runs: int) -> str:
-    """The standard error of a mean is sd / sqrt(n), of a standard deviation about sd / sqrt(2 (n - 1))."""
+def _cell(row: dict[str, Any], key: str, runs: int) -> str:
+    """Format a cell; the standard error of a mean is sd / sqrt(n), of an sd about sd / sqrt(2 (n - 1))."""
     mean = key.endswith("mean")
     spread = row[key.replace("mean", "sd")]
     error = spread / sqrt(runs) if mean else spread / sqrt(2 * (runs - 1))
@@ -32,18 +32,18 @@ def _beside(row: dict[str, Any], key: str, runs: int) -> str:
 
 
 def print_users(result: dict[str, Any], console: Console) -> None:
-    """Crossing and reward per user, with and without the prior."""
+    """Print the break-even and the reward of each user, with and without the prior."""
     title = f"Users A to D, {result['runs']} runs, seed {result['seed']}"
     table = Table("user", "prior", "break-even", "R mean ± standard error", title=title)
     for row in result["users"]:
         reward = f"{row['reward_mean']:.2f} ± {row['reward_se']:.2f}"
-        table.add_row(row["user"], "yes" if row["prior"] else "no", _episode(row["crossing"]), reward)
+        table.add_row(row["user"], "yes" if row["prior"] else "no", _episode_text(row["crossing"]), reward)
     console.print(table)
     print_criterion(result["criterion"], console)
 
 
 def print_learners(result: dict[str, Any], console: Console) -> None:
-    """Reward, break-even, regret and worst dip per learner and user, means ± standard errors."""
+    """Print reward, break-even, regret and worst dip of each learner with each user."""
     title = f"Learners, {result['runs']} runs, seed {result['seed']}: means ± standard errors"
     table = Table("user", "learner", "reward", "break-even", "regret", "worst dip", title=title)
     for row in result["results"]:
@@ -51,12 +51,12 @@ def print_learners(result: dict[str, Any], console: Console) -> None:
         regret = "-" if row["regret_mean"] is None else f"{row['regret_mean']:.2f} ± {error}"
         dip = f"{row['worst_dip']:.2f} ± {row['worst_dip_se']:.2f}"
         reward = f"{row['reward_mean']:.2f} ± {error}"
-        table.add_row(row["user"], row["learner"], reward, _episode(row["break_even"]), regret, dip)
+        table.add_row(row["user"], row["learner"], reward, _episode_text(row["break_even"]), regret, dip)
     console.print(table)
 
 
 def print_criterion(criterion: list[Point], console: Console) -> None:
-    """Each point's verdict, and the whole."""
+    """Print the verdict on each point, and advice if one fails."""
     table = Table("criterion", "verdict", "detail", title="Criterion (MODEL.md, section 5)")
     for point in criterion:
         verdict = "[green]holds[/]" if point["passed"] else "[red]fails[/]"
@@ -66,5 +66,5 @@ def print_criterion(criterion: list[Point], console: Console) -> None:
         console.print("A 500-run sample of this model passes all of it in about 9 of 10 seeds: try two more seeds.")
 
 
-def _episode(number: int | None) -> str:
+def _episode_text(number: int | None) -> str:
     return "never" if number is None else str(number)

@@ -1,7 +1,7 @@
 """One simulated session, one event at a time, through the cores that the services run.
 
-Pure: there is no bus and no clock. Its persons and random numbers are those of ``batched_sessions`` and of the live
-driver over HTTP; with a discount of 0 all three agree step by step for the same session seed.
+Pure: there is no bus and no clock. The persons and random numbers are those of ``batched_sessions`` and ``live``.
+With a discount of 0, all three agree step by step for the same session seed.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from shift_study.loading import study_json
 from shift_study.study import Study
 
 from shift_simulator.gaze_plan import chunk_of, plan_gaze
-from shift_simulator.simulated_person import SimulatedPerson, person, task_names
+from shift_simulator.simulated_person import SimulatedPerson, create_person, task_names
 from shift_simulator.users import User
 
 SESSION = "simulated"
@@ -41,7 +41,7 @@ SOURCE = "simulator"
 
 
 class Episode(NamedTuple):
-    """One interaction: what was seen at the decision, the decision, and how it went."""
+    """One interaction: the observation at the decision, the decision, and the performance."""
 
     observation: Observation
     decision: Decision
@@ -50,23 +50,23 @@ class Episode(NamedTuple):
 
 
 def play(user: User, study: Study, seed: int, episodes: int) -> Iterator[Episode]:
-    """A session of ``episodes`` interactions with the session seed ``seed``."""
+    """Yield the ``episodes`` interactions of a session with the session seed ``seed``."""
     mesh = Mesh(study, seed)
-    someone = person(user, study, seed)
+    person = create_person(user, study, seed)
     tasks = task_names(user, study)
     for n in range(1, episodes + 1):
-        mesh.look(someone, n)
+        mesh.look(person, n)
         observation = mesh.observation
-        decision = mesh.decide(tasks[someone.next_task(n)], n)
+        decision = mesh.decide(tasks[person.next_task(n)], n)
         action = decision.actions.index(decision.strategy)
-        performance = mesh.report(someone, decision, action)
-        someone = someone.after(action)
+        performance = mesh.report(person, decision, action)
+        person = person.after(action)
         yield Episode(observation, decision, action, performance)
 
 
 @dataclass
 class Mesh:
-    """The three cores, each fact handed to those who read it at once."""
+    """The three cores of monitor, decider and learner; each fact reaches its readers at once."""
 
     study: Study
     seed: int
@@ -82,31 +82,31 @@ class Mesh:
             session=SESSION, stamp=self._now, participant="P00", study=self.study.study, seed=self.seed,
             state=LIVE, started=self._now, format=FORMAT,
         )  # fmt: skip
-        self._pass_on(start)
-        self._pass_on(Config(session=SESSION, stamp=self._now, version=1, study=study_json(self.study)))
+        self._apply(start)
+        self._apply(Config(session=SESSION, stamp=self._now, version=1, study=study_json(self.study)))
 
-    def look(self, someone: SimulatedPerson, n: int) -> None:
-        """Bring the person's gaze class about."""
-        looks = plan_gaze(self.study, self.observation.gaze, someone.wanted_gaze(n))
+    def look(self, person: SimulatedPerson, n: int) -> None:
+        """Apply the gaze that produces the person's gaze class in interaction ``n``."""
+        looks = plan_gaze(self.study, self.observation.gaze, person.wanted_gaze(n))
         if looks:
             chunk, self._clock_ns = chunk_of(self.study, looks, SOURCE, self._chunks, self._clock_ns)
             self._chunks += 1
-            self._pass_on(chunk)
+            self._apply(chunk)
 
     def decide(self, task: str, n: int) -> Decision:
-        """The next decision."""
+        """Return the decision for a task in interaction ``n``."""
         done = decider.step(self._decider, Decide(command_id=f"d{n}", session=SESSION, task=task), self._now)
         self._decider = done.state
         for fact in done.facts:
-            self._pass_on(fact)
+            self._apply(fact)
         decision = done.facts[-1]
         assert isinstance(decision, Decision)
         return decision
 
-    def report(self, someone: SimulatedPerson, decision: Decision, action: int) -> Performance:
-        """How the person does, reported."""
+    def report(self, person: SimulatedPerson, decision: Decision, action: int) -> Performance:
+        """Let the person perform the task, and return the performance that the learner publishes."""
         seen = decision.observation
-        outcome = someone.perform(decision.n, Triple(seen.capacity, seen.gaze, seen.awareness), action)
+        outcome = person.perform(decision.n, Triple(seen.capacity, seen.gaze, seen.awareness), action)
         command = ReportPerformance(
             command_id=decision.decision_id, session=SESSION,
             comprehension=Result(success=outcome.success, duration_s=outcome.comprehension_s),
@@ -115,14 +115,14 @@ class Mesh:
         done = learner.step(self._learner, command, self._now)
         self._learner = done.state
         for fact in done.facts:
-            self._pass_on(fact)
+            self._apply(fact)
         return next(fact for fact in done.facts if isinstance(fact, Performance))
 
-    def _pass_on(self, event: Fact | GazeChunk) -> None:
-        """A fact or a chunk of gaze, to all cores, with what follows from it."""
-        watched = monitor.step(self._monitor, event, self._now)
-        self._monitor = watched.state
-        facts = list(watched.facts)
+    def _apply(self, event: Fact | GazeChunk) -> None:
+        """Apply a fact or a chunk of gaze to the cores, and the facts that result from it to the decider."""
+        observed = monitor.step(self._monitor, event, self._now)
+        self._monitor = observed.state
+        facts = list(observed.facts)
         if isinstance(event, Fact):
             learned = learner.step(self._learner, event, self._now)
             self._learner = learned.state

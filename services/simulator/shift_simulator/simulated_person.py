@@ -1,8 +1,8 @@
 """One simulated person, one event at a time.
 
-Pure: every answer follows from the user, the seed and the number of the interaction. A driver calls, for
-n = 1, 2, ...: ``next_task(n)`` and ``wanted_gaze(n)``; after the decision ``perform(n, ...)``; and it goes on with
-the person that ``after(action)`` returns.
+Pure: every result depends only on the user, the seed and the number of the interaction. For n = 1, 2, ..., a driver
+calls ``next_task(n)`` and ``wanted_gaze(n)``, and after the decision ``perform(n, ...)``. It continues with the
+person that ``after(action)`` returns.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ class Outcome(NamedTuple):
 
 @dataclass(frozen=True)
 class SimulatedPerson:
-    """A simulated user in one session of a study. :func:`person` makes one."""
+    """A simulated user in one session of a study, made by :func:`create_person`."""
 
     user: User
     study: Study
     seed: int
-    """The session's seed: the decider draws from the same one, at stream 0."""
+    """The session's seed; the decider uses the same one, with stream 0."""
     capacity: float
-    """Its true processing capacity."""
+    """The true processing capacity."""
     previous: int | None = None
     """The action of the last explanation, an index."""
 
@@ -65,10 +65,10 @@ class SimulatedPerson:
     def perform(self, n: int, triple: Triple, action: int) -> Outcome:
         """Return the outcome of the action (an index) at the triple that the decision shows.
 
-        The table is read at the person's true capacity class; with probability 0.05 a fair coin decides instead.
+        The table is read at the person's true capacity class. With probability 0.05, a fair coin decides instead.
         """
-        lasts = [DURATIONS[int(uniform(self.seed, n, s) * len(DURATIONS))] for s in (T_COMPREHENSION, T_ENABLEDNESS)]
-        return Outcome(self._succeeds(n, triple, action), float(lasts[0]), float(lasts[1]))
+        times_s = [DURATIONS[int(uniform(self.seed, n, s) * len(DURATIONS))] for s in (T_COMPREHENSION, T_ENABLEDNESS)]
+        return Outcome(self._succeeds(n, triple, action), float(times_s[0]), float(times_s[1]))
 
     def after(self, action: int) -> SimulatedPerson:
         """Return the person after an explanation with this action, by the capacity equation."""
@@ -89,7 +89,7 @@ class SimulatedPerson:
         return uniform(self.seed, n, SUCCESS) < float(self.user.table_at(n)[true.number, action])
 
 
-def person(user: User, study: Study, seed: int) -> SimulatedPerson:
+def create_person(user: User, study: Study, seed: int) -> SimulatedPerson:
     """Return the person at the start of a session with this seed."""
     return SimulatedPerson(user, study, seed, true_capacity(user, study).start)
 

@@ -1,4 +1,4 @@
-"""The paper's Table II, simulated: twelve settings of the Q-learner with user A (MODEL.md, section 5)."""
+"""The paper's Table II, simulated: twelve settings of the Q-learner with user A (docs/model.md, section 5)."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ MEASURES = ("z_mean", "z_sd", "r_mean", "r_sd")
 
 
 def table2(seed: int, runs: int = RUNS) -> dict[str, Any]:
-    """The twelve rows, beside the paper's, and the verdict on the criterion (INTERFACE.md, "Command line").
+    """Return the twelve rows, the paper's values, and the verdict on the criterion (docs/interface.md, "Command line").
 
-    All rows meet the same ``runs`` simulated sessions, so that they differ by their settings alone.
+    All rows use the same ``runs`` simulated sessions, so they differ only by their settings.
     """
     cumulative = _cumulative(seed, runs)
     rows = [_row(setting, cumulative[:, i * runs : (i + 1) * runs]) for i, setting in enumerate(PAPER)]
@@ -61,7 +61,7 @@ def table2(seed: int, runs: int = RUNS) -> dict[str, Any]:
 
 
 def _cumulative(seed: int, runs: int) -> Floats:
-    """Cumulative reward, float [episodes, 12 x runs]: the rows side by side."""
+    """Return the cumulative reward of all rows side by side, float [episodes, 12 x runs]."""
     study = Study(study="table2")
     prior = np.repeat([study.learner.prior_value * s.prior for s in PAPER], runs)
     rate = np.repeat([s.learning_rate for s in PAPER], runs)
@@ -73,18 +73,18 @@ def _cumulative(seed: int, runs: int) -> Floats:
 
 def _row(setting: Setting, cumulative: Floats) -> dict[str, Any]:
     zero, reward = zero_crossings(cumulative), cumulative[-1]
-    found = (zero.mean(), zero.std(ddof=1), reward.mean(), reward.std(ddof=1))
+    values = (zero.mean(), zero.std(ddof=1), reward.mean(), reward.std(ddof=1))
     return {
         "row": setting.row,
         "prior": setting.prior,
         "learning_rate": setting.learning_rate,
         "discount": setting.discount,
-        **{key: float(value) for key, value in zip(MEASURES, found, strict=True)},
+        **{key: float(value) for key, value in zip(MEASURES, values, strict=True)},
         "paper": {key: getattr(setting, key) for key in MEASURES},
     }
 
 
 def zero_crossings(cumulative: Floats) -> Floats:
-    """Z per run: the first episode, from 0, whose cumulative reward is above 0; else how many there are."""
+    """Return Z of each run: the first episode (from 0) with a cumulative reward above 0, or else their number."""
     above = cumulative > 0
     return np.where(above.any(axis=0), above.argmax(axis=0), len(cumulative)).astype(np.float64)

@@ -1,4 +1,4 @@
-"""A simulated user by the name that a person writes: one of the paper's, or the path of a user file."""
+"""Simulated users by name: the name of one of the paper's users, or the path of a user file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from shift_schemas.suggestions import did_you_mean
 from shift_simulator.users import PAPER_USERS, User, paper_user, parse_user
 
 
-def user_named(name: str) -> User:
+def find_user(name: str) -> User:
     """Return user A, B, C or D of the paper, or the user of the file ``name``.
 
     Raises
@@ -18,10 +18,10 @@ def user_named(name: str) -> User:
     InvalidSettings
         There is no such user and no such file, the file cannot be read, or it has a mistake.
     """
-    return paper_user(name) if name in PAPER_USERS else parse_user(_text_of(name), name)
+    return paper_user(name) if name in PAPER_USERS else parse_user(_read_text(name), name)
 
 
-def _text_of(name: str) -> str:
+def _read_text(name: str) -> str:
     try:
         return Path(name).read_text(encoding="utf-8-sig")
     except FileNotFoundError as e:
@@ -34,5 +34,5 @@ def _text_of(name: str) -> str:
     except UnicodeDecodeError as e:
         raise InvalidSettings(f"{name} is not text in UTF-8, so it is not a user file; give one in JSON") from e
     except (OSError, ValueError) as e:  # a folder, no permission, a null character in the name
-        why = e.strerror if isinstance(e, OSError) else e
-        raise InvalidSettings(f"the user file {shorten(name)} cannot be read: {why}") from e
+        reason = e.strerror if isinstance(e, OSError) else e
+        raise InvalidSettings(f"the user file {shorten(name)} cannot be read: {reason}") from e

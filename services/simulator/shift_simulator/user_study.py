@@ -18,9 +18,9 @@ from shift_simulator.users import PAPER_USERS, paper_user
 
 
 def users(seed: int, runs: int = RUNS) -> dict[str, Any]:
-    """Crossing and reward per user, with and without the prior, the curves and the criterion.
+    """Return the break-even and reward of each user with and without the prior, the curves and the criterion.
 
-    ``curves`` holds what the figure shows, per user and prior: the mean cumulative reward after each episode,
+    ``curves`` holds the data of the figure for each user and prior: the mean cumulative reward after each episode,
     and the band between the 10th and 90th percentile of the runs.
     """
     rows, curves = [], []
@@ -32,18 +32,21 @@ def users(seed: int, runs: int = RUNS) -> dict[str, Any]:
 
 
 def _curves(name: str, seed: int, runs: int) -> dict[bool, Floats]:
-    """Cumulative reward with and without the prior, each [episodes, runs], on the same sessions."""
+    """Return the cumulative reward with and without the prior on the same sessions, each [episodes, runs]."""
     study = Study(study="users")
     settings = study.learner
     prior = np.repeat([settings.prior_value, 0.0], runs)
-    both = np.ones(2 * runs)
-    learner = BatchQLearning(Context(study), prior, settings.learning_rate * both, settings.discount * both)
-    found = simulate(paper_user(name), study, learner, session_seeds(seed, runs), EPISODES, 2).cumulative
-    return {True: found[:, :runs], False: found[:, runs:]}
+    ones = np.ones(2 * runs)
+    learner = BatchQLearning(Context(study), prior, settings.learning_rate * ones, settings.discount * ones)
+    cumulative = simulate(paper_user(name), study, learner, session_seeds(seed, runs), EPISODES, 2).cumulative
+    return {True: cumulative[:, :runs], False: cumulative[:, runs:]}
 
 
 def crossing(cumulative: Floats) -> int | None:
-    """Break-even of the mean curve: one after the last episode at or below 0, from 1; None if it ends there."""
+    """Return the break-even of the mean curve, or None if it ends at or below 0.
+
+    It is the number (from 1) of the episode after the last one at or below 0.
+    """
     below = np.flatnonzero(cumulative.mean(axis=1) <= 0)
     after = int(below[-1]) + 2 if len(below) else 1
     return after if after <= len(cumulative) else None
@@ -64,8 +67,8 @@ def _curve(cumulative: Floats) -> dict[str, Any]:
 
 
 def draw_users(result: dict[str, Any], out_dir: Path) -> list[Path]:
-    """Draw a panel per user, cumulative reward with and without the prior, as PNG and SVG."""
-    from shift_simulator.figures import STYLES, draw_curve, finish, label_panels, on_one_scale, panels, saved
+    """Draw the cumulative reward with and without the prior, one panel for each user, as PNG and SVG."""
+    from shift_simulator.figures import STYLES, draw_curve, finish, label_panels, on_one_scale, panels, save_figure
 
     names = list(dict.fromkeys(c["user"] for c in result["curves"]))
     figure, (axes,) = panels(len(names), 1.6)
@@ -83,4 +86,4 @@ def draw_users(result: dict[str, Any], out_dir: Path) -> list[Path]:
         f"Line: mean of n = {runs} simulated runs (seed {seed}). Band: the middle 80 % of the runs (10th to 90th "
         "percentile).",
     )
-    return saved(figure, out_dir, "users")
+    return save_figure(figure, out_dir, "users")

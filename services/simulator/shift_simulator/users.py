@@ -1,8 +1,8 @@
-"""Simulated users: for each of the 30 triples and 6 actions, how probable success is.
+"""Simulated users: the probability of success for each of the 30 triples and 6 actions.
 
-Pure. Users A to D are the paper's (section V-B; MODEL.md, section 5); any other comes from a user file,
-which is JSON (INTERFACE.md, "Command line"). A user is data: ``batched_sessions`` simulates many runs of it
-at once, ``simulated_person`` one.
+Pure. Users A to D are the paper's (section V-B; docs/model.md, section 5). Any other user comes from a user file in
+JSON (docs/evaluation.md, "User files"). A user is data: ``batched_sessions`` simulates many runs of it at once, and
+``simulated_person`` simulates one.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from shift_study.study import Study
 
 ACTIONS = 6
 DEVIATION = 0.05
-"""Probability that an outcome is a fair coin: the paper's "5 % of behavior that deviates"."""
+"""Probability that a fair coin decides the outcome (the paper's "5 % of behavior that deviates")."""
 DURATIONS = (4, 5, 6, 7, 8)
-"""T in seconds, each as probable; fitted (MODEL.md, section 5)."""
+"""Values of T in seconds, equally probable; fitted (docs/model.md, section 5)."""
 
 Table = Annotated[
     list[Annotated[list[Probability], Field(min_length=ACTIONS, max_length=ACTIONS)]],
@@ -39,20 +39,20 @@ class _Part(BaseModel):
 
 
 class Change(_Part):
-    """The person changes: another table holds from here on."""
+    """A change of the person: from here on another table holds."""
 
-    at: int = Field(ge=1, le=100_000, description="After this many interactions.")
-    success: Table = Field(description="The table from then on.")
+    at: int = Field(ge=1, le=100_000, description="The number of interactions before the change.")
+    success: Table = Field(description="The table after the change.")
 
 
 class GazeHabit(_Part):
-    """How the gaze class goes on from one interaction to the next; it begins focused."""
+    """How the gaze class continues from one interaction to the next. The first one is focused."""
 
-    keep: Probability = Field(default=0.3, description="Kept with this probability, else uniform; fitted.")
+    keep: Probability = Field(default=0.3, description="Probability that it stays; else it is drawn uniformly. Fitted.")
 
 
 class TrueCapacity(_Part):
-    """What differs from the study's capacity constants in this person."""
+    """The capacity constants of this person that differ from the study's."""
 
     start: NonNegative | None = None
     min: NonNegative | None = None
@@ -65,11 +65,11 @@ class TrueCapacity(_Part):
 
 
 class User(_Part):
-    """A simulated user, as a user file gives it."""
+    """A simulated user, with the fields of a user file."""
 
-    user: Id = Field(description="Its name.")
+    user: Id = Field(description="The user's name.")
     success: Table = Field(description="Probability of success, 30 triples x 6 actions, before the coin flips.")
-    changes: Annotated[list[Change], Field(max_length=1000)] = Field(default=[], description="In rising order.")
+    changes: Annotated[list[Change], Field(max_length=1000)] = Field(default=[], description="In rising order of at.")
     gaze: GazeHabit = GazeHabit()
     tasks: int = Field(default=3, ge=1, le=500, description="How many tasks, drawn uniformly with replacement.")
     capacity: TrueCapacity = TrueCapacity()
@@ -81,25 +81,25 @@ class User(_Part):
         return self
 
     def table_at(self, n: int) -> NDArray[np.float64]:
-        """The table that holds for interaction ``n`` (from 1): float [30, 6]."""
-        held = [change.success for change in self.changes if n > change.at]
-        return np.asarray(held[-1] if held else self.success, dtype=np.float64)
+        """Return the table that holds for interaction ``n`` (from 1), float [30, 6]."""
+        past = [change.success for change in self.changes if n > change.at]
+        return np.asarray(past[-1] if past else self.success, dtype=np.float64)
 
 
 def true_capacity(user: User, study: Study) -> CapacitySettings:
-    """The person's own capacity constants: the study's, but for what the user file says."""
-    differs = user.capacity.model_dump(exclude_none=True)
+    """Return the person's own capacity constants: those of the user file, and the study's for the rest."""
+    own = user.capacity.model_dump(exclude_none=True)
     try:
-        return CapacitySettings.model_validate(study.capacity.model_dump() | differs)
+        return CapacitySettings.model_validate(study.capacity.model_dump() | own)
     except ValidationError as e:
-        raise InvalidSettings(f"user {user.user}: capacity: {_said(e)}", field_errors(e, "capacity")) from e
+        raise InvalidSettings(f"user {user.user}: capacity: {_describe(e)}", field_errors(e, "capacity")) from e
 
 
-# --- the paper's four ---
+# --- users A to D ---
 
 
 def paper_user(name: str) -> User:
-    """User A, B, C or D of the paper (section V-B), each a function of the one before."""
+    """Return user A, B, C or D of the paper (section V-B)."""
     if name not in PAPER_USERS:
         raise InvalidSettings(f"there is no built-in user {shorten(name)!r}; write one of {', '.join(PAPER_USERS)}")
     suggested = suggestions(ScoringSettings.model_validate({}))
@@ -114,7 +114,7 @@ PAPER_USERS = ("A", "B", "C", "D")
 
 
 def _succeeds(name: str, triple: Triple, action: int, suggested: bool) -> bool:
-    """MODEL.md, section 5. A negation is any action but the two affirmations, which come first."""
+    """Return whether the action succeeds (docs/model.md, section 5). Actions 0 and 1 have no negation."""
     if name == "A" or action < 2:
         return suggested
     fails = triple.capacity == "high"
@@ -129,33 +129,33 @@ def _succeeds(name: str, triple: Triple, action: int, suggested: bool) -> bool:
 
 
 def parse_user(text: str, name: str = "user file") -> User:
-    """The user that ``text`` spells (JSON).
+    """Return the user that ``text`` (JSON) describes.
 
     Raises
     ------
     InvalidSettings
-        Naming the place, the value and the rule of each mistake; ``name`` is the file's.
+        The text has mistakes. The message names the file (``name``), and the place, value and rule of each mistake.
     """
     try:
-        data = json.loads(text, parse_constant=_no_constant, object_pairs_hook=_no_repeats)
+        data = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_refuse_repeats)
     except (ValueError, RecursionError) as e:
         raise InvalidSettings(f"{name}: this is not a user file in JSON: {e}") from e
     try:
         return User.model_validate_json(json.dumps(data))
     except ValidationError as e:
-        raise InvalidSettings(f"{name}: {_said(e)}", field_errors(e)) from e
+        raise InvalidSettings(f"{name}: {_describe(e)}", field_errors(e)) from e
 
 
-def _said(error: ValidationError) -> str:
+def _describe(error: ValidationError) -> str:
     return "; ".join(f"{f.field} is {f.value or 'missing'}: {f.rule}" for f in field_errors(error))
 
 
-def _no_constant(text: str) -> Any:
+def _refuse_constant(text: str) -> Any:
     raise ValueError(f"{text} is not a number in JSON; write a number")
 
 
-def _no_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _refuse_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     keys = [key for key, _ in pairs]
-    if twice := [key for key in keys if keys.count(key) > 1]:
-        raise ValueError(f"{shorten(twice[0])!r} is given twice; keep one of the two")
+    if repeats := [key for key in keys if keys.count(key) > 1]:
+        raise ValueError(f"{shorten(repeats[0])!r} is given twice; keep one of the two")
     return dict(pairs)

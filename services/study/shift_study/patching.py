@@ -16,3 +16,11 @@ def merge_patch(target: Any, patch: Any) -> Any:
         else:
             merged[key] = merge_patch(merged.get(key), value)
     return merged
+
+
+def merge_patch_between(before: Any, after: Any) -> Any:
+    """Return the JSON merge patch (RFC 7386) that turns ``before`` into ``after``."""
+    if not isinstance(before, dict) or not isinstance(after, dict):
+        return after
+    patch = {key: merge_patch_between(before.get(key), v) for key, v in after.items() if before.get(key, ...) != v}
+    return patch | dict.fromkeys(before.keys() - after.keys())

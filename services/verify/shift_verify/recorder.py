@@ -26,6 +26,7 @@ from shift_schemas.messages import (
     StartSession,
 )
 from shift_study.loading import as_recorded
+from shift_study.patching import merge_patch_between
 
 from shift_verify.difference import Differs, Placed, compare, differ, is_missing
 
@@ -146,11 +147,3 @@ def mark_command(fact: Marker) -> Mark:
         command_id=fact.marker_id, session=fact.session, text=fact.text, retracts=fact.retracts or None,
         author=fact.author,
     )  # fmt: skip
-
-
-def merge_patch_between(before: Any, after: Any) -> Any:
-    """Return the JSON merge patch (RFC 7386) that turns ``before`` into ``after``."""
-    if not isinstance(before, dict) or not isinstance(after, dict):
-        return after
-    patch = {key: merge_patch_between(before.get(key), v) for key, v in after.items() if before.get(key, ...) != v}
-    return patch | dict.fromkeys(before.keys() - after.keys())

@@ -102,7 +102,7 @@ def _configurations(configs: list[Config]) -> Iterator[Change]:
     current = _study(configs[-1]) if configs else {}
     for before, after in pairwise(configs):
         changed = differences(_study(before), _study(after))
-        what = ", ".join(f"{'.'.join(path)} {_word(old)} → {_word(new)}" for path, (old, new) in changed.items())
+        what = ", ".join(f"{'.'.join(path)} {word(old)} → {word(new)}" for path, (old, new) in changed.items())
         holds = bool(changed) and all(_value(current, path) == new for path, (_, new) in changed.items())
         now = "in force" if holds else "undone or changed again" if changed else "nothing changed"
         kind = f"configuration {after.version}"
@@ -169,5 +169,6 @@ def _value(data: Any, path: Path) -> Any:
     return data
 
 
-def _word(value: Any) -> str:
+def word(value: Any) -> str:
+    """Return a value of a study as text."""
     return "not set" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)

@@ -95,7 +95,7 @@ def _decision_row(decision: Decision, report: Performance | None, selected: bool
     triple = f"{seen.capacity}/{seen.gaze}/{seen.awareness}"
     select = Button(str(decision.n), SELECT, decision.n, f"Show decision {decision.n}")
     cells: list[Cell | str] = [
-        Cell(button=select), clock_time(decision.stamp.ns), decision.task, triple,
+        Cell(button=select), Cell(clock_time(decision.stamp.ns), small=decision.decision_id), decision.task, triple,
         decision.cognitive_state, levels(decision.strategy), propensity, decision.policy_source, reward,
         truth(decision.explored), truth(decision.stale),
     ]  # fmt: skip

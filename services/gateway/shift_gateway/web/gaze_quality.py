@@ -40,7 +40,7 @@ class SourceQuality(NamedTuple):
     def text(self) -> str:
         """The quality in one line, such as ``ok 118 Hz, lost 4 %, 0.1 s``."""
         age = f"{self.age_s:.1f} s" if self.age_s < 100 else f"{self.age_s / 60:.0f} min"
-        return f"{self.level} {self.rate_hz:.0f} Hz, lost {self.lost:.0%}, {age}".replace("%", " %")
+        return f"{self.level} {self.rate_hz:.0f} Hz, lost {self.lost * 100:.0f} %, {age}"
 
     @property
     def sentence(self) -> str:
@@ -48,10 +48,11 @@ class SourceQuality(NamedTuple):
         if self.age_s > SILENT_S:
             return f"No gaze for {self.age_s:.0f} s: check the eye tracker and its program."
         if self.lost > LOSS_WARNING:
-            return f"{self.lost:.0%} of the samples are lost: check the participant's position and the calibration."
+            share = f"{self.lost * 100:.0f} %"
+            return f"{share} of the samples are lost: check the participant's position and the calibration."
         if self.age_s > OLD_S:
             return f"The last gaze came {self.age_s:.1f} s ago; it should come several times a second."
-        return f"Gaze comes at {self.rate_hz:.0f} Hz, and {self.lost:.0%} of the samples are lost."
+        return f"Gaze comes at {self.rate_hz:.0f} Hz, and {self.lost * 100:.0f} % of the samples are lost."
 
 
 def qualities(chunks: Iterable[GazeSummary], now_ns: int) -> dict[str, SourceQuality]:

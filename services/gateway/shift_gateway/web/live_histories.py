@@ -5,17 +5,14 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass, field
 
-from shift_runtime.bus.protocol import Reply, first_answer
 from shift_runtime.read_model import SessionView
-from shift_runtime.reader import PULL_TIMEOUT_S, fact_of
-from shift_schemas.codec import decode, encode
-from shift_schemas.errors import MalformedMessage, Unavailable
-from shift_schemas.keys import ServiceKey, build_key
-from shift_schemas.messages import Fact, Observation, OutboxPage, OutboxQuery
+from shift_runtime.reader import fact_of
+from shift_schemas.messages import Fact, Observation, OutboxQuery
 from shift_schemas.registry import OWNERS
 
 from shift_gateway.gateway import Gateway
 from shift_gateway.web.history import SessionHistory
+from shift_gateway.web.outbox import outbox_page
 
 TAIL = {Observation.owner: 6000}
 """The owner of gaze is read from this many messages before its end: about five minutes at eight chunks a second."""
@@ -95,7 +92,8 @@ class LiveHistories:
     async def _read(self, session: str, owner: str, last: int, history: SessionHistory) -> None:
         first = max(0, last - TAIL.get(owner, last))
         while first < last:
-            page = await self._page(owner, OutboxQuery(cursors={session: first}, only=[session], closed=True))
+            query = OutboxQuery(cursors={session: first}, only=[session], closed=True)
+            page = await outbox_page(self._gateway.mesh.bus, owner, query)
             for row in page.rows:
                 if first < row.seq <= last:
                     history.apply(fact_of(row))
@@ -103,18 +101,3 @@ class LiveHistories:
                 return
             first = page.rows[-1].seq
             await asyncio.sleep(0)
-
-    async def _page(self, owner: str, query: OutboxQuery) -> OutboxPage:
-        bus = self._gateway.mesh.bus
-        key = build_key(ServiceKey(owner, "outbox"))
-        page = await first_answer(bus, key, encode(query), timeout_s=PULL_TIMEOUT_S, read=_page_of)
-        if page is None:
-            raise Unavailable(f"the {owner} does not answer")
-        return page
-
-
-def _page_of(reply: Reply) -> OutboxPage | None:
-    try:
-        return decode(OutboxPage, reply.payload) if reply.ok else None
-    except MalformedMessage:
-        return None

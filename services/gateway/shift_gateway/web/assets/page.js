@@ -154,6 +154,24 @@
       const text = old ? `Old values: last heard from the mesh at ${shift.lastText}. The page goes on by itself.` : '';
       if (banner.textContent !== text) banner.textContent = text;
     },
+    position(s) { // a position on a recording's time line, minutes and seconds
+      const whole = Math.max(0, Math.floor(s)), pad = (n) => String(n).padStart(2, '0');
+      const h = Math.floor(whole / 3600), m = Math.floor(whole / 60) % 60;
+      return (h ? `${h}:${pad(m)}` : `${m}`) + `:${pad(whole % 60)}`;
+    },
+    cursor(id, s, charts) {
+      const chart = chartOf(id);
+      if (chart) chart.setOption({ series: [...Array(charts).keys()].map((i) => (
+        { id: `cursor${i}`, markLine: { data: [{ xAxis: s }] } })) });
+    },
+    saveSvg(id, name) { // the chart is drawn as SVG anyway, so that the file is what is seen
+      const svg = getElement(id).$el.querySelector('svg').cloneNode(true);
+      svg.setAttribute('xmlns', 'http://www.w3.org/2000/svg');
+      const link = document.createElement('a');
+      link.href = URL.createObjectURL(new Blob([svg.outerHTML], { type: 'image/svg+xml' }));
+      link.download = name; link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    },
     theme(next) {
       if (next) localStorage.setItem('shift-theme', next);
       return localStorage.getItem('shift-theme') || 'auto';
@@ -177,6 +195,9 @@
 
   document.addEventListener('DOMContentLoaded', () => {
     setInterval(shift.mark, 500);
+    setInterval(() => { // tables that scroll are reached by the keyboard
+      for (const e of document.querySelectorAll('.q-table__middle:not([tabindex]), .lines:not([tabindex])')) e.tabIndex = 0;
+    }, 500);
     new MutationObserver(retheme).observe(document.body, { attributes: true, attributeFilter: ['class'] });
     new MutationObserver((changes) => {
       if (changes.some((c) => [...c.addedNodes].some((n) => n.querySelector &&

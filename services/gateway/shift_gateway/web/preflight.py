@@ -1,0 +1,64 @@
+"""What the pre-flight list asks the mesh, at most once a second for all open start pages together."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import time
+
+from shift_schemas.errors import Unavailable
+from shift_schemas.lifecycle import has_ended
+from shift_schemas.messages import Health, OutboxQuery
+from shift_schemas.registry import OWNERS
+
+from shift_gateway.gateway import Gateway
+from shift_gateway.web.outbox import outbox_page
+from shift_gateway.web.start_view import Check, disk_check, lag_check, service_check
+
+ASK_EVERY_S = 1.0
+
+
+class Preflight:
+    """The checks of the services, the recorder's lag and the disk."""
+
+    def __init__(self, gateway: Gateway) -> None:
+        self._gateway = gateway
+        self._heard: dict[str, int] = {}
+        self._asked = -ASK_EVERY_S
+        self._checks: list[Check] = []
+        self._asking: asyncio.Task[list[Check]] | None = None
+
+    async def checks(self) -> list[Check]:
+        """Return the checks; they are asked for anew if they are older than a second."""
+        if self._asking is None or (self._asking.done() and time.monotonic() - self._asked >= ASK_EVERY_S):
+            self._asked = time.monotonic()
+            self._asking = asyncio.create_task(self._ask())
+        return await asyncio.shield(self._asking)
+
+    async def _ask(self) -> list[Check]:
+        answers = await asyncio.gather(*(self._gateway.mesh.health(owner) for owner in OWNERS))
+        now_ns = self._gateway.api.clock.now().ns
+        found: dict[str, Health | None] = dict(zip(OWNERS, answers, strict=True))
+        found["gateway"] = self._gateway.health()
+        for name, health in found.items():
+            if health is not None:
+                self._heard[name] = now_ns
+        checks = [service_check(name, health, self._heard.get(name)) for name, health in found.items()]
+        disk = await asyncio.to_thread(shutil.disk_usage, self._gateway.settings.data)
+        return [*checks, lag_check(await self._behind(), now_ns), disk_check(disk.free, disk.total, now_ns)]
+
+    async def _behind(self) -> int | None:
+        """Return how many messages of live sessions the recorder has not read yet; None if it does not answer."""
+        read_model = self._gateway.read_model
+        live = [name for name, view in read_model.views.items() if not has_ended(view.fact.state)]
+        heads = dict(read_model.reader.cursors)
+        query = OutboxQuery(cursors={name: heads.get((name, "recorder"), 0) for name in live}, only=live, limit=1)
+        try:
+            page = await outbox_page(self._gateway.mesh.bus, "recorder", query)
+        except Unavailable:
+            return None
+        return sum(
+            max(n - page.cursors[name].get(owner, 0), 0)
+            for (name, owner), n in heads.items()
+            if owner != "recorder" and name in page.cursors
+        )
