@@ -1,192 +1,172 @@
-"""What the desk shows of a session: the decisions, how each came about, what was learned, and the changes. Pure."""
+"""What the desk view shows of a session at one time: its numbers, its decisions and the person's awareness. Pure."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from shift_model.vocabulary import TRIPLES, Triple
-from shift_schemas.messages import Config, Decision, Policy
-from shift_study.patching import merge_patch_between
-from shift_study.scoring import reduce
-from shift_study.study import Study
+from shift_schemas.messages import Decision, Estimate, Observation, Performance, SessionState
+from shift_schemas.timestamps import NS
+from shift_study.loading import study_from_json
 
 from shift_gateway.web.history import END_OF_TIME, SessionHistory
-from shift_gateway.web.wording import clock_time, levels
+from shift_gateway.web.score_parts import ScoreParts, score_parts
+from shift_gateway.web.table_rows import Button, Cell, Row
+from shift_gateway.web.wording import clock_time, duration, levels
+
+NOTHING = "–"
+"""What is shown for a value that does not exist."""
+SELECT = "desk-select"
+"""The browser's event for a decision that was selected, with its number."""
 
 
-def history_rows(history: SessionHistory, at_ns: int = END_OF_TIME) -> list[dict[str, Any]]:
-    """Return one row for each decision, the newest first."""
-    reports = {p.decision_id: p for p in history.performances.until(at_ns)}
-    rows = []
-    for decision in reversed(history.decisions.until(at_ns)):
-        report, seen = reports.get(decision.decision_id), decision.observation
-        rows.append(
-            {
-                "n": decision.n, "time": clock_time(decision.stamp.ns), "task": decision.task,
-                "observation": f"{seen.capacity} / {seen.gaze} / {seen.awareness}",
-                "state": decision.cognitive_state, "strategy": levels(decision.strategy),
-                "source": decision.policy_source, "p": number(decision.propensity, 2),
-                "explored": words(decision.explored), "stale": words(decision.stale),
-                "reward": number(report.reward if report else None), "decision_id": decision.decision_id,
-            }
-        )  # fmt: skip
-    return rows
+class DeskNumbers(NamedTuple):
+    """The single values, as text."""
+
+    title: str = ""
+    state: SessionState = "live"
+    focus_shift: str = NOTHING
+    capacity: str = NOTHING
+    gaze: str = NOTHING
+    epsilon: str = NOTHING
+    cumulative_reward: str = "0.00"
+    learner: str = ""
+    paused: bool = False
 
 
-def number(value: float | None, digits: int = 3) -> str:
-    """Return a number as text; a missing one is a dash."""
-    return "–" if value is None else f"{value:.{digits}f}"
+def desk_numbers(history: SessionHistory, now_ns: int, at_ns: int = END_OF_TIME) -> DeskNumbers:
+    """Return the values of a time; ``now_ns`` is the time against which the session's length is measured, ns."""
+    session, study = history.session(at_ns), history.study(at_ns)
+    if session is None or study is None:
+        return DeskNumbers()
+    observation, policy = history.observation(at_ns), history.policies.last(at_ns)
+    report, decision = history.performances.last(at_ns), history.decisions.last(at_ns)
+    ended = session.ended.ns if session.ended else now_ns
+    length = duration((min(now_ns, ended) - session.started.ns) / NS)
+    n = decision.n if decision else 0
+    epsilon = NOTHING if policy is None else "none" if policy.epsilon is None else f"{policy.epsilon:.2f}"
+    return DeskNumbers(
+        title=f"{session.participant} · {session.study} · {length} · decision {n}/{study.interactions}",
+        state=session.state,
+        focus_shift=f"{observation.gaze.focus_shift:.2f}" if observation else NOTHING,
+        capacity=f"{observation.capacity.value:.2f} {observation.capacity.category}" if observation else NOTHING,
+        gaze=observation.gaze.category if observation else NOTHING,
+        epsilon=epsilon,
+        cumulative_reward=f"{report.cumulative_reward:.2f}" if report else "0.00",
+        learner=study.learner.name,
+        paused=study.learner.paused,
+    )
 
 
-def words(value: bool) -> str:
-    """Return a truth value as messages write it."""
+def facts_so_far(history: SessionHistory, at_ns: int = END_OF_TIME) -> tuple[int, ...]:
+    """Return the counts of the facts that the tables are made of: they change only with these."""
+    series = (
+        history.configs, history.decisions, history.performances, history.policies, history.estimates,
+        history.overrides, history.markers, history.sessions,
+    )  # fmt: skip
+    return tuple(found.count(at_ns) for found in series)
+
+
+# --- decisions ---
+
+
+def selected_decision(history: SessionHistory, n: int | None, at_ns: int = END_OF_TIME) -> Decision | None:
+    """Return the decision with this number; the last one if there is none, or if none is selected."""
+    found = next((d for d in history.decisions.until(at_ns) if d.n == n), None) if n is not None else None
+    return found or history.decisions.last(at_ns)
+
+
+def reports_in_force(history: SessionHistory, at_ns: int = END_OF_TIME) -> dict[str, Performance]:
+    """Return the report of each reported decision, by the decision's id: a correction replaces the first one."""
+    return {p.decision_id: p for p in history.performances.until(at_ns)}
+
+
+def decision_rows(history: SessionHistory, selected: int | None, at_ns: int = END_OF_TIME) -> list[Row]:
+    """Return a row for each decision, the newest first."""
+    reports = reports_in_force(history, at_ns)
+    return [
+        _decision_row(d, reports.get(d.decision_id), d.n == selected) for d in reversed(history.decisions.until(at_ns))
+    ]
+
+
+def _decision_row(decision: Decision, report: Performance | None, selected: bool) -> Row:
+    seen = decision.observation
+    propensity = NOTHING if decision.propensity is None else f"{decision.propensity:.2f}"
+    reward = NOTHING if report is None else f"{report.reward:.2f}" + (" (corrected)" if report.corrects else "")
+    triple = f"{seen.capacity}/{seen.gaze}/{seen.awareness}"
+    select = Button(str(decision.n), SELECT, decision.n, f"Show decision {decision.n}")
+    cells: list[Cell | str] = [
+        Cell(button=select), Cell(clock_time(decision.stamp.ns), small=decision.decision_id), decision.task, triple,
+        decision.cognitive_state, levels(decision.strategy), propensity, decision.policy_source, reward,
+        truth(decision.explored), truth(decision.stale),
+    ]  # fmt: skip
+    return Row(cells, f"decision-{decision.n}", "selected" if selected else "")
+
+
+def truth(value: bool) -> str:
+    """Return a truth value as the wire has it."""
     return "true" if value else "false"
 
 
-class Contribution(NamedTuple):
-    """How one strategy's score and level follow from the scoring table (paper, section III-C)."""
-
-    strategy: str
-    entries: tuple[float, float, float]
-    """The table's entries for the observed capacity, gaze and awareness."""
-    weight: float
-    score: float
-    thresholds: tuple[float, ...]
-    level: str
-    """The level that the scoring system suggests."""
-
-    @property
-    def text(self) -> str:
-        """The computation in one line."""
-        capacity, gaze, awareness = (f"{entry:g}" for entry in self.entries)
-        limits = ", ".join(f"{t:.2f}" for t in self.thresholds)
-        return (
-            f"{self.strategy}: capacity {capacity} + gaze {gaze} + awareness {awareness}, weight {self.weight:g}, "
-            f"score {self.score:.3f}; thresholds {limits}; suggests {self.level}"
-        )
+def parts_of(history: SessionHistory, decision: Decision | None) -> tuple[ScoreParts, ...]:
+    """Return how the scoring table led to a decision's scores, by the configuration that the decision was made with."""
+    if decision is None:
+        return ()
+    version = decision.versions.config
+    config = next((c for c in reversed(history.configs.items) if c.version == version), None)
+    if config is None:
+        return ()
+    return score_parts(study_from_json(config.study).scoring, decision.observation, decision.strategy)
 
 
-def contributions(study: Study, decision: Decision) -> list[Contribution]:
-    """Return how the scores of a decision follow from the study's table."""
-    seen = decision.observation
-    rows = study.scoring.table.rows(Triple(seen.capacity, seen.gaze, seen.awareness))
+def score_rows(parts: tuple[ScoreParts, ...]) -> list[Row]:
+    """Return a row for each strategy: three entries, their sum, the score, and the level that follows."""
     return [
-        Contribution(
-            name, (rows[0][name], rows[1][name], rows[2][name]), strategy.weight, decision.scores[name],
-            tuple(strategy.thresholds), decision.suggested[name],
-        )
-        for name, strategy in study.scoring.strategies.items()
+        Row([
+            part.strategy, *(Cell(f"{value:g}", small=word) for _, word, value in part.entries), f"{part.total:g}",
+            f"{part.weight:g}", Cell(f"{part.score:.2f}", small=f"{part.weight:g} × {part.total:g} / {part.s_max:g}"),
+            ", ".join(f"{t:.2f}" for t in part.thresholds), part.suggested, part.chosen or NOTHING,
+        ])
+        for part in parts
     ]  # fmt: skip
 
 
-def scores_text(scores: Mapping[str, float]) -> str:
-    """Return the scores in one line."""
-    return ", ".join(f"{name} {score:.3f}" for name, score in scores.items())
+def scores_text(decision: Decision | Estimate | None) -> str:
+    """Return the scores of a decision or estimate, such as ``negation 0.33, hesitation 0.67``."""
+    if decision is None:
+        return NOTHING
+    return ", ".join(f"{name} {score:.2f}" for name, score in decision.scores.items())
 
 
-def probabilities(actions: Sequence[Mapping[str, str]], row: Sequence[float]) -> list[tuple[str, float]]:
-    """Return each action with its probability."""
-    return [(levels(action), p) for action, p in zip(actions, row, strict=True)]
-
-
-def value_rows(policy: Policy) -> list[dict[str, str]]:
-    """Return a row for each state of the policy: value and visits of each action, as ``0.250 (3)``."""
-    names = [levels(action) for action in policy.actions]
+def probability_rows(decision: Decision | None) -> list[Row]:
+    """Return a row for each action: its probability, and whether it was suggested and chosen."""
+    if decision is None:
+        return [Row(["no decision yet", "", ""])]
+    marks = ((decision.strategy, "chosen"), (decision.suggested, "suggested by the scoring table"))
     return [
-        {"state": state, **{n: f"{v:.3f} ({c})" for n, v, c in zip(names, row.values, row.visits, strict=True)}}
-        for state, row in policy.states.items()
+        Row([levels(action), f"{p:.2f}", ", ".join(word for a, word in marks if a == action)])
+        for action, p in zip(decision.actions, decision.probabilities, strict=True)
     ]
 
 
-def heat_map(policy: Policy) -> list[list[Any]]:
-    """Return the cells of the heat map: action's index, state's index, value."""
+# --- the person ---
+
+
+def awareness_rows(observation: Observation | None) -> list[Row]:
+    """Return a row for each task that has results: its class, and the success ratios of both dimensions."""
+    if observation is None or not observation.awareness:
+        return [Row(["no results yet", "", "", "", ""])]
     return [
-        [action, state, round(value, 3)]
-        for state, row in enumerate(policy.states.values())
-        for action, value in enumerate(row.values)
-    ]
+        Row(
+            [
+                task, seen.category, Cell(f"{seen.comprehension:.2f}", bar=seen.comprehension),
+                Cell(f"{seen.enabledness:.2f}", bar=seen.enabledness), str(seen.results),
+            ],
+            f"awareness-{task}",
+        )
+        for task, seen in observation.awareness.items()
+    ]  # fmt: skip
 
 
-def awareness_texts(history: SessionHistory, at_ns: int = END_OF_TIME) -> dict[str, str]:
-    """Return the awareness of each task that has results, in its two dimensions."""
-    observation = history.observation(at_ns)
-    if observation is None:
-        return {}
-    return {
-        task: f"{a.category}, comprehension {a.comprehension:.2f}, enabledness {a.enabledness:.2f}, "
-        f"{a.results} result{'' if a.results == 1 else 's'}"
-        for task, a in observation.awareness.items()
-    }
-
-
-def reward_curve(history: SessionHistory, at_ns: int = END_OF_TIME) -> list[list[float]]:
-    """Return the cumulative reward after each report: its number and the sum."""
-    return [[p.n, round(p.cumulative_reward, 4)] for p in history.performances.until(at_ns)]
-
-
-# --- changes of the configuration ---
-
-
-class Change(NamedTuple):
-    """One configuration, compared with the one before it."""
-
-    version: int
-    time: str
-    author: str
-    differences: tuple[tuple[str, str, str], ...]
-    """Path, old value and new value."""
-    undo: dict[str, Any]
-    """The merge patch that takes the change back."""
-
-    @property
-    def text(self) -> str:
-        """The change in one line."""
-        who = self.author or "name not given"
-        what = "; ".join(f"{path}: {old} → {new}" for path, old, new in self.differences) or "nothing differs"
-        return f"{self.version} at {self.time}, {who}: {what}"
-
-
-def changes(configs: Sequence[Config]) -> list[Change]:
-    """Return every change after the start, the newest first."""
-    found = []
-    for before, after in pairwise(configs):
-        old, new = json.loads(before.study), json.loads(after.study)
-        found.append(
-            Change(
-                after.version, clock_time(after.stamp.ns), after.author, tuple(differences(old, new)),
-                merge_patch_between(new, old),
-            )
-        )  # fmt: skip
-    return found[::-1]
-
-
-def differences(old: Any, new: Any, path: str = "") -> Iterator[tuple[str, str, str]]:
-    """Yield the path, the old and the new value of each difference between two studies as plain objects."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        for key in {**old, **new}:
-            if old.get(key) != new.get(key):
-                yield from differences(old.get(key), new.get(key), f"{path}.{key}" if path else key)
-    else:
-        yield path, json.dumps(old), json.dumps(new)
-
-
-class StateChange(NamedTuple):
-    """A triple whose cognitive state would be another one."""
-
-    triple: Triple
-    before: str
-    after: str
-
-    @property
-    def text(self) -> str:
-        """The change in one line."""
-        return f"{self.triple.name}: {self.before} → {self.after}"
-
-
-def state_changes(before: Study, after: Study) -> list[StateChange]:
-    """Return the triples whose cognitive state differs between two studies."""
-    pairs = ((t, reduce(before.scoring, t).cognitive_state, reduce(after.scoring, t).cognitive_state) for t in TRIPLES)
-    return [StateChange(*pair) for pair in pairs if pair[1] != pair[2]]
+def reward_points(history: SessionHistory, at_ns: int = END_OF_TIME) -> list[tuple[int, float]]:
+    """Return the cumulative reward after each report, by the report's number."""
+    return [(p.n, round(p.cumulative_reward, 4)) for p in history.performances.until(at_ns)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from nicegui import ui
 from shift_schemas.errors import ShiftError
@@ -85,15 +85,3 @@ def show_error(error: ShiftError) -> None:
     """Show a refusal: its sentence, and the rule of each wrong field."""
     rules = [f"{e.field}: {e.rule}" for e in error.errors if e.rule not in error.detail]
     ui.notify("\n".join([error.detail, *rules]), type="negative", multi_line=True, timeout=12_000, close_button="close")
-
-
-def redraw(chart: ui.echart, changed: dict[str, Any]) -> None:
-    """Give a chart new parts of its options, such as the data of its series, without sending all options again.
-
-    A chart that the browser has not drawn yet gets them with its first options.
-    """
-    for key, value in changed.items():
-        known = chart.options[key]
-        for old, new in zip(known, value, strict=False) if isinstance(value, list) else [(known, value)]:
-            old.update(new)
-    chart.run_chart_method("setOption", changed)

@@ -12,7 +12,7 @@ from shift_study.study import Study
 
 from shift_gateway.gateway import Gateway
 from shift_gateway.recordings import recording_path
-from shift_gateway.web.desk_page import DeskPanels
+from shift_gateway.web.desk_elements import DeskElements
 from shift_gateway.web.layout import Frame, explain, testid, text
 from shift_gateway.web.recording_history import RecordingHistory, read_history
 from shift_gateway.web.recording_verification import WORK, VerifyResult
@@ -155,7 +155,8 @@ class Player:
         self._controls()
         self._elements = RoomElements(study)
         self._room()
-        self._desk = DeskPanels(recording.history)
+        with ui.element("div").classes("desk"):
+            self._desk = DeskElements(recording.history, self._select)
         self._events()
         self._timer = ui.timer(TICK_S, self._tick, active=False)
         self._go(self._length_s)
@@ -250,6 +251,13 @@ class Player:
         view = room_view(self._recording.history, at_ns, at_ns)
         self._elements.show(view)
         self._sources.show(view.sources)
-        self._desk.show_person(at_ns)
-        self._desk.show(at_ns)
-        ui.run_javascript(stimulus_script(view) + f"shift.cursor({self._chart.id}, {shown}, {LINKED})")
+        ui.run_javascript(
+            stimulus_script(view)
+            + f"shift.cursor({self._chart.id}, {shown}, {LINKED});"
+            + self._desk.script(at_ns, at_ns)
+        )
+
+    def _select(self, n: int) -> None:
+        """Explain a decision."""
+        self._desk.selected = n
+        self._go(self._position_s)

@@ -8,8 +8,8 @@ from typing import Any, Literal, NamedTuple
 
 from shift_schemas.messages import Config, Decision
 
+from shift_gateway.web.change_list import differences, word
 from shift_gateway.web.charts import gaps, shortened
-from shift_gateway.web.desk_view import differences
 from shift_gateway.web.history import END_OF_TIME, SessionHistory
 from shift_gateway.web.recording_history import RecordingHistory
 from shift_gateway.web.recording_summary import is_blinded
@@ -213,7 +213,10 @@ def events(recording: RecordingHistory) -> list[Event]:
 def changed_keys(before: Config, after: Config) -> str:
     """Return what a configuration changed, such as ``learner.epsilon: 0.75 → 0.2``."""
     found = differences(json.loads(before.study), json.loads(after.study))
-    lines = [f"{path}: {shortened(old, 60)} → {shortened(new, 60)}" for path, old, new in found]
+    lines = [
+        f"{'.'.join(path)}: {shortened(word(old), 60)} → {shortened(word(new), 60)}"
+        for path, (old, new) in found.items()
+    ]
     return "; ".join(lines) or "nothing changed"
 
 
