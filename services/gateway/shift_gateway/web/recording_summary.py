@@ -91,13 +91,13 @@ def summary_of(path: Path) -> RecordingSummary:
     ended = session is not None and has_ended(session.state)
     summary = RecordingSummary(
         name=path.name,
-        blinded=_is_blinded(counted.study or recording.metadata.get(CONFIG_METADATA, {}).get("study", "")),
+        blinded=is_blinded(counted.study or recording.metadata.get(CONFIG_METADATA, {}).get("study", "")),
         decisions=len(counted.decisions),
         lost=lost,
         overrides=sum(d.policy_source == "override" for d in counted.decisions),
         stale=sum(d.stale for d in counted.decisions),
         changes=max(counted.configs - 1, 0),
-        reason=_reason(recording, reason) or ("" if ended else "the session has not ended"),
+        reason=reason_of(recording, reason) or ("" if ended else "the session has not ended"),
     )
     if session is None:
         said = recording.metadata.get(SESSION_METADATA, {})
@@ -118,13 +118,13 @@ def send_summaries(send: Send, *paths: str) -> None:
         send(summary_of(Path(path)))
 
 
-def _reason(recording: Recording, error: str) -> str:
+def reason_of(recording: Recording, error: str) -> str:
     """Return why the file could not be read to its end, without its name."""
     report = recording.report
     return report.reason if report.damaged or not error else error
 
 
-def _is_blinded(study: str) -> bool:
+def is_blinded(study: str) -> bool:
     """Return whether the condition is to be hidden. It is if the study is not known."""
     try:
         return bool(json.loads(study).get("blinded", False))

@@ -17,7 +17,7 @@ import os
 import pickle
 import struct
 import sys
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncGenerator, Callable
 from typing import Any, ClassVar, NamedTuple
 
 from shift_schemas.errors import ShiftError, Unavailable
@@ -50,7 +50,7 @@ class _Failed(NamedTuple):
     detail: str
 
 
-async def parts_of(function: str, *arguments: str) -> AsyncIterator[Any]:
+async def parts_of(function: str, *arguments: str) -> AsyncGenerator[Any, None]:
     """Run ``module:function`` in a process, and yield what it sends. Leaving the iteration ends the process.
 
     Raises
@@ -77,7 +77,7 @@ async def parts_of(function: str, *arguments: str) -> AsyncIterator[Any]:
                 await process.wait()
 
 
-async def _parts(stream: asyncio.StreamReader) -> AsyncIterator[Any]:
+async def _parts(stream: asyncio.StreamReader) -> AsyncGenerator[Any, None]:
     while True:
         try:
             (length,) = _HEAD.unpack(await stream.readexactly(_HEAD.size))

@@ -1,0 +1,304 @@
+"""What the page of a recording shows: its time line, the table of its events, and why a decision was made. Pure."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple
+
+from shift_schemas.messages import Config, Decision
+
+from shift_gateway.web.charts import gaps, shortened
+from shift_gateway.web.history import END_OF_TIME, SessionHistory
+from shift_gateway.web.recording_history import RecordingHistory
+from shift_gateway.web.recording_summary import is_blinded
+from shift_gateway.web.recordings_view import BLINDED
+from shift_gateway.web.wording import date_and_time, duration, levels, origin, reasons
+
+MOST_POINTS = 3000
+"""A curve has at most this many points; more would not be seen on a screen. Chosen."""
+LINKED = 4
+"""The number of charts that share the time axis."""
+TIME_AXIS = {"type": "value", "axisLabel": {":formatter": "shift.position"}, "axisTick": {"show": False}}
+NEUTRAL, CURSOR = "rgba(125,135,145,.35)", "#d1495b"
+"""Colours that are seen on light and on dark ground."""
+EventKind = Literal["session", "decision", "result", "override", "marker", "change", "gap"]
+
+
+class Event(NamedTuple):
+    """One row of the table beside the time line."""
+
+    position_s: float
+    kind: EventKind
+    what: str
+
+
+class Head(NamedTuple):
+    """The lines above the time line."""
+
+    title: str
+    facts: str
+
+
+def recording_head(recording: RecordingHistory, name: str) -> Head:
+    """Return whose recording it is. The condition of a blinded study is hidden."""
+    session = recording.history.session()
+    if session is None:
+        return Head(name, "The start of the session is not in this file.")
+    config = recording.history.configs.last()
+    hidden = session.condition and is_blinded(config.study if config else "")
+    condition = BLINDED if hidden else (session.condition or "no condition")
+    parts = [
+        f"participant {session.participant}", f"study {session.study}", f"condition {condition}",
+        f"seed {session.seed}", f"started {date_and_time(session.started.ns)}",
+        f"length {duration(recording.length_s)}",
+    ]  # fmt: skip
+    return Head(name, " · ".join(parts))
+
+
+# --- the time line ---
+
+
+def timeline_options(recording: RecordingHistory) -> dict[str, Any]:
+    """Return the ECharts options of the time line. Times are seconds from the session's start."""
+    history = recording.history
+    decisions = [(recording.position_s(ns), d) for ns, d in _entries(history, "decisions")]
+    states = _names([d.cognitive_state for _, d in decisions])
+    strategies = _names([levels(d.strategy) for _, d in decisions])
+    length = max(recording.length_s, 1.0)
+    return {
+        "animation": False,
+        "aria": {
+            "enabled": True, "decal": {"show": True},
+            "label": {"description": "The time line of the session. The table of events below says the same in words."},
+        },
+        "tooltip": {"trigger": "axis", "renderMode": "richText", "axisPointer": {"type": "line"}, "confine": True},
+        "axisPointer": {"link": [{"xAxisIndex": "all"}]},
+        "legend": {"data": ["capacity", "focus shift", "markers", "reward", "cumulative reward"], "top": 0},
+        "dataZoom": [{"type": "slider", "xAxisIndex": list(range(LINKED)), "bottom": 4, "height": 18,
+                      "labelFormatter": "", "filterMode": "none"}],
+        "grid": _grids(len(states), len(strategies)),
+        "xAxis": [
+            {**TIME_AXIS, "gridIndex": i, "min": 0, "max": length,
+             "axisLabel": {**TIME_AXIS["axisLabel"], "show": i == LINKED - 1}}  # type: ignore[dict-item]
+            for i in range(LINKED)
+        ],
+        "yAxis": [
+            {"gridIndex": 0, "type": "value", "min": 0, "max": 1, "interval": 0.5},
+            {"gridIndex": 1, "type": "category", "data": states, "axisTick": {"show": False}},
+            {"gridIndex": 2, "type": "category", "data": strategies, "axisTick": {"show": False}},
+            {"gridIndex": 3, "type": "value", "name": "", "splitNumber": 2},
+            {"gridIndex": 3, "type": "value", "position": "right", "splitNumber": 2, "splitLine": {"show": False}},
+        ],
+        "series": [
+            *_curves(recording), _markers(recording),
+            _steps("state", 1, [[s, d.cognitive_state] for s, d in decisions], length),
+            _steps("strategy", 2, [[s, levels(d.strategy)] for s, d in decisions], length),
+            *_rewards(recording), *_cursors(),
+        ],
+    }  # fmt: skip
+
+
+def timeline_height(options: dict[str, Any]) -> int:
+    """Return the height of the time line, px."""
+    return sum(int(grid["height"]) for grid in options["grid"]) + 26 + 12 * (LINKED - 1) + 60
+
+
+def _grids(states: int, strategies: int) -> list[dict[str, Any]]:
+    found, top = [], 26
+    for height in (110, 20 + 17 * max(states, 1), 20 + 17 * max(strategies, 1), 80):
+        found.append({"left": 190, "right": 50, "top": top, "height": height})
+        top += height + 12
+    return found
+
+
+def _curves(recording: RecordingHistory) -> list[dict[str, Any]]:
+    points = recording.history.observations
+    times = [recording.position_s(ns) for ns in points.times]
+    capacity = [(s, point.capacity) for s, point in zip(times, points.items, strict=True)]
+    shift = [(s, point.focus_shift) for s, point in zip(times, points.items, strict=True)]
+    return [
+        {"name": "capacity", "type": "line", "step": "end", "showSymbol": False, "lineStyle": {"width": 2},
+         "data": thinned(capacity), "markArea": {
+             "silent": True, "itemStyle": {"color": NEUTRAL},
+             "data": [[{"xAxis": first}, {"xAxis": last}] for first, last in gaze_gaps(recording)]}},
+        {"name": "focus shift", "type": "line", "showSymbol": False, "lineStyle": {"width": 1, "type": "dashed"},
+         "data": thinned(shift)},
+    ]  # fmt: skip
+
+
+def _markers(recording: RecordingHistory) -> dict[str, Any]:
+    markers = _entries(recording.history, "markers")
+    return {
+        "name": "markers", "type": "scatter", "symbol": "triangle", "symbolRotate": 180, "symbolSize": 11,
+        "data": [{"value": [recording.position_s(ns), 0.95], "name": shortened(m.text, 60)} for ns, m in markers],
+        "tooltip": {":formatter": "(p) => p.name"},
+    }  # fmt: skip
+
+
+def _steps(name: str, axis: int, data: list[list[Any]], length: float) -> dict[str, Any]:
+    """Return a line that stays at each value until the next one. The last value lasts until the end."""
+    return {
+        "name": name, "type": "line", "step": "end", "xAxisIndex": axis, "yAxisIndex": axis, "symbolSize": 7,
+        "symbol": "circle", "showSymbol": len(data) <= 200, "lineStyle": {"width": 2},
+        "data": [*data, {"value": [length, data[-1][1]], "symbol": "none"}] if data else [],
+    }  # fmt: skip
+
+
+def _rewards(recording: RecordingHistory) -> list[dict[str, Any]]:
+    results = [(recording.position_s(ns), p) for ns, p in _entries(recording.history, "performances")]
+    return [
+        {"name": "reward", "type": "bar", "barWidth": 4, "xAxisIndex": 3, "yAxisIndex": 3,
+         "data": [[s, round(p.reward, 4)] for s, p in results]},
+        {"name": "cumulative reward", "type": "line", "step": "end", "showSymbol": False, "xAxisIndex": 3,
+         "yAxisIndex": 4, "lineStyle": {"width": 2}, "data": [[s, round(p.cumulative_reward, 4)] for s, p in results]},
+    ]  # fmt: skip
+
+
+def _cursors() -> list[dict[str, Any]]:
+    """Return a line without points for each chart, which carries the cursor."""
+    style = {"color": CURSOR, "width": 2, "type": "solid"}
+    mark = {"silent": True, "symbol": "none", "animation": False, "label": {"show": False}, "lineStyle": style}
+    return [
+        {"id": f"cursor{i}", "type": "line", "xAxisIndex": i, "yAxisIndex": i, "data": [],
+         "markLine": {**mark, "data": [{"xAxis": 0}]}}
+        for i in range(LINKED)
+    ]  # fmt: skip
+
+
+def thinned(points: list[tuple[float, float]], most: int = MOST_POINTS) -> list[list[float]]:
+    """Return a curve with at most ``most`` points. It keeps the smallest and the largest value of each stretch."""
+    if len(points) > most:
+        width = -(-len(points) // (most // 2))
+        kept: list[tuple[float, float]] = []
+        for first in range(0, len(points), width):
+            stretch = points[first : first + width]
+            ends = (min(stretch, key=lambda p: p[1]), max(stretch, key=lambda p: p[1]))
+            kept += sorted(set(ends))
+        points = kept
+    return [[round(s, 3), round(value, 4)] for s, value in points]
+
+
+def gaze_gaps(recording: RecordingHistory) -> list[tuple[float, float]]:
+    """Return the times without valid gaze, as positions in seconds."""
+    last_ns = recording.at_ns(recording.length_s)
+    found = gaps(recording.history, recording.first_ns, last_ns)
+    return [(recording.position_s(a * 1_000_000), recording.position_s(b * 1_000_000)) for a, b in found]
+
+
+# --- the table ---
+
+
+def events(recording: RecordingHistory) -> list[Event]:
+    """Return everything that happened, in the order of time."""
+    history = recording.history
+    found = [Event(first, "gap", f"no valid gaze for {last - first:.1f} s") for first, last in gaze_gaps(recording)]
+
+    def add(name: str, kind: EventKind, what: Any) -> None:
+        found.extend(Event(recording.position_s(ns), kind, what(x)) for ns, x in _entries(history, name))
+
+    add("sessions", "session", lambda s: f"the session is {s.state}")
+    add("decisions", "decision", _decision_text)
+    add("performances", "result", _result_text)
+    add("overrides", "override", lambda o: f"next {o.task}: {levels(o.strategy) or 'no override'} {o.reason}".strip())
+    add("markers", "marker", lambda m: m.text)
+    found += [
+        Event(recording.position_s(ns), "change", f"configuration {after.version}: {changed_keys(before, after)}")
+        for (_, before), (ns, after) in pairwise(_entries(history, "configs"))
+    ]
+    return sorted(found, key=lambda event: event.position_s)
+
+
+def changed_keys(before: Config, after: Config) -> str:
+    """Return what a configuration changed, such as ``learner.epsilon 0.75 → 0.2``."""
+    return "; ".join(_changed(json.loads(before.study), json.loads(after.study), "")) or "nothing changed"
+
+
+def _changed(before: Any, after: Any, at: str) -> list[str]:
+    if isinstance(before, dict) and isinstance(after, dict):
+        keys = dict.fromkeys([*before, *after])
+        inner = [_changed(before.get(k), after.get(k), f"{at}.{k}" if at else str(k)) for k in keys]
+        return [line for lines in inner for line in lines]
+    return [] if before == after else [f"{at} {shortened(str(before), 60)} → {shortened(str(after), 60)}"]
+
+
+def _decision_text(decision: Decision) -> str:
+    where = f"{decision.n}, {decision.task}: {levels(decision.strategy)} in {decision.cognitive_state}"
+    return f"{where} ({origin(decision)})"
+
+
+def _result_text(result: Any) -> str:
+    sides = [
+        f"{name} {'success' if side.success else 'failure'} in {side.duration_s:g} s"
+        for name, side in (("comprehension", result.comprehension), ("enabledness", result.enabledness))
+    ]
+    corrected = ", corrects an earlier report" if result.corrects else ""
+    reward = f"reward {result.reward:+.3f}, sum {result.cumulative_reward:+.3f}"
+    return f"{result.task}: {', '.join(sides)}; {reward}{corrected}"
+
+
+# --- the decision under the cursor ---
+
+
+class Choice(NamedTuple):
+    """One action that the decision could have taken."""
+
+    strategy: str
+    probability: float
+    value: float | None
+    """The learner's value in the decision's state; None if the policy is not in the recording."""
+    visits: int | None
+    chosen: bool
+    suggested: bool
+
+
+class Explanation(NamedTuple):
+    """Why the last decision was made."""
+
+    lines: tuple[tuple[str, str], ...] = ()
+    """Label and value."""
+    choices: tuple[Choice, ...] = ()
+
+
+def explanation(history: SessionHistory, at_ns: int = END_OF_TIME) -> Explanation:
+    """Return why the last decision at a time was made; empty before the first decision."""
+    decision = history.decisions.last(at_ns)
+    if decision is None:
+        return Explanation()
+    policy = next((p for p in history.policies.until(at_ns) if p.version == decision.versions.policy), None)
+    row = policy.states.get(decision.state) if policy else None
+    result = history.performance_of(decision.decision_id, at_ns)
+    lines = (
+        ("observation", reasons(decision.observation)),
+        ("scores", ", ".join(f"{name} {score:.3f}" for name, score in decision.scores.items())),
+        ("state", decision.cognitive_state),
+        ("suggested by the scoring table", levels(decision.suggested)),
+        ("chosen", f"{levels(decision.strategy)} ({origin(decision)})"),
+        ("exploration rate", f"{policy.epsilon:.3f}" if policy and policy.epsilon is not None else "none"),
+        ("reward", f"{result.reward:+.3f}" if result else "no result yet"),
+        ("cumulative reward", f"{_cumulative(history, at_ns):+.3f}"),
+    )
+    choices = [
+        Choice(
+            levels(action), p, row.values[i] if row and i < len(row.values) else None,
+            row.visits[i] if row and i < len(row.visits) else None,
+            action == decision.strategy, action == decision.suggested,
+        )
+        for i, (action, p) in enumerate(zip(decision.actions, decision.probabilities, strict=False))
+    ]  # fmt: skip
+    return Explanation(lines, tuple(choices))
+
+
+def _cumulative(history: SessionHistory, at_ns: int) -> float:
+    last = history.performances.last(at_ns)
+    return last.cumulative_reward if last else 0.0
+
+
+def _entries(history: SessionHistory, name: str) -> list[tuple[int, Any]]:
+    return list(getattr(history, name).between(-1, END_OF_TIME))
+
+
+def _names(values: list[str]) -> list[str]:
+    """Return the different values in the order in which they are first seen, from the top of the chart down."""
+    return list(dict.fromkeys(values))[::-1]
+
