@@ -112,7 +112,7 @@ def test_every_parameter_belongs_to_a_learner() -> None:
     assert set(LEARNER_SETTINGS) == set(LearnerName.__args__)
     assert frozenset().union(*(parameters_of(name) for name in LEARNER_SETTINGS)) == set(
         LearnerSettings.model_fields
-    ) - {"name"}
+    ) - {"name", "paused"}
 
 
 # --- units, cells and shapes in what is refused ---

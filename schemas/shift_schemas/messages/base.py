@@ -23,6 +23,8 @@ SessionEvent = Literal["input", "end", "finish"]
 GazeOutcome = Literal["applied", "late"]
 Seconds = Annotated[float, Field(ge=-1e11, le=1e11)]
 Text = Annotated[str, Field(max_length=10_000)]
+Author = Annotated[str, Field(max_length=100)]
+"""The name of the person who made a change, as they gave it; empty: not given."""
 MOST_WARNINGS = 100
 Warnings = Annotated[list[str], Field(max_length=MOST_WARNINGS)]
 DEEPEST = 32
@@ -151,6 +153,11 @@ class Command(Message):
     """The words of its refusal, if its id was used before with another content."""
     not_content: ClassVar[frozenset[str]] = frozenset({"need", "command_id"})
     """Fields that a repeat may have otherwise."""
+    added: ClassVar[frozenset[str]] = frozenset()
+    """Fields that earlier versions did not have. They are no content while they are left out, so that a repeat after an
+    update still equals the first command."""
+    query_fields: ClassVar[frozenset[str]] = frozenset()
+    """Fields that REST reads from the address (``?author=Anna``), because the body cannot have them."""
 
     command_id: Id
     session: Id
@@ -160,7 +167,8 @@ class Command(Message):
 
     def content(self) -> str:
         """Return what a repeat must be equal in: everything but what the sender had read by then."""
-        return self.model_dump_json(exclude=set(self.not_content))
+        absent = {name for name in self.added if getattr(self, name) == type(self).model_fields[name].default}
+        return self.model_dump_json(exclude={*self.not_content, *absent})
 
     @classmethod
     def body_fields(cls) -> tuple[str, ...]:

@@ -6,7 +6,18 @@ from pydantic import Field
 from shift_model.vocabulary import AwarenessClass, CapacityClass, GazeClass, PolicySource
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, RepeatWording, RestRoute, Seen, Strategy, Text
+from shift_schemas.messages.base import (
+    Author,
+    Command,
+    Count,
+    Fact,
+    Message,
+    RepeatWording,
+    RestRoute,
+    Seen,
+    Strategy,
+    Text,
+)
 
 
 class TripleView(Message):
@@ -72,15 +83,19 @@ class Decision(Fact):
 
 
 class Override(Fact):
-    """The strategy that the experimenter chose for a task's next decision."""
+    """The strategy that the experimenter chose for a task's next decision, or the withdrawal of such a choice."""
 
     owner = "decider"
     subject = "override"
 
     override_id: Id
     task: Id
-    strategy: Strategy
+    strategy: Strategy = Field(description="One level of each strategy; empty for a withdrawal.")
     reason: Text = ""
+    withdraws: str = Field(
+        default="", description="The override that is withdrawn before a decision used it; '' is none."
+    )
+    author: Author = Field(default="", description="Who chose it, if the name was given.")
 
 
 class Decide(Command):
@@ -101,7 +116,7 @@ class Decide(Command):
 
 
 class SetOverride(Command):
-    """Choose the strategy of the task's next decision."""
+    """Choose the strategy of the task's next decision, or withdraw such a choice before a decision used it."""
 
     owner = "decider"
     procedure = "override"
@@ -114,9 +129,15 @@ class SetOverride(Command):
         "override {id} was set before", "override", "Choose another override_id for another override"
     )
 
+    added = frozenset({"withdraws", "author"})
+
     task: Id
-    strategy: Strategy = Field(description="One level of each of the study's strategies.")
+    strategy: Strategy = Field(
+        default={}, description="One level of each of the study's strategies; left out with withdraws."
+    )
     reason: Text = ""
+    withdraws: Id | None = Field(default=None, description="The override to withdraw, instead of a strategy.")
+    author: Author = Field(default="", description="Your name, for the list of changes.")
 
     def content(self) -> str:
         """Return the content with the levels sorted: another order is not another override."""

@@ -8,7 +8,17 @@ from pydantic import Field
 from shift_model.vocabulary import LearnerName
 
 from shift_schemas.ids import Id
-from shift_schemas.messages.base import Command, Count, Fact, Message, RepeatWording, RestRoute, Strategy, Warnings
+from shift_schemas.messages.base import (
+    Author,
+    Command,
+    Count,
+    Fact,
+    Message,
+    RepeatWording,
+    RestRoute,
+    Strategy,
+    Warnings,
+)
 from shift_schemas.messages.decider import Versions
 
 
@@ -44,6 +54,7 @@ class Performance(Fact):
         default=0, description="Which of the task's results it is, from 1; a correction has that of the first report."
     )
     warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake.")
+    author: Author = Field(default="", description="Who entered it by hand, if the name was given.")
 
 
 class Transition(Fact):
@@ -93,6 +104,7 @@ class PerformanceBody(Message):
     comprehension: Result
     enabledness: Result
     corrects: bool = Field(default=False, description="Replace the decision's earlier report; both are recorded.")
+    author: Author = Field(default="", description="Your name, if you enter the result by hand.")
 
 
 class ReportPerformance(Command):
@@ -113,14 +125,12 @@ class ReportPerformance(Command):
         "decision's decision_id",
     )
 
+    added = frozenset({"corrects", "author"})
+
     comprehension: Result
     enabledness: Result
     corrects: Id | None = Field(default=None, description="The decision whose report this one replaces.")
-
-    def content(self) -> str:
-        """Return the content; a first report has no ``corrects``, as in version 0.1."""
-        excluded = self.not_content if self.corrects is not None else {*self.not_content, "corrects"}
-        return self.model_dump_json(exclude=set(excluded))
+    author: Author = ""
 
     @property
     def decision_id(self) -> str:
@@ -136,7 +146,10 @@ class ReportPerformance(Command):
     def fields_in(cls, body: PerformanceBody) -> dict[str, Any]:
         """Return both results, and the decision that a correction is about."""
         corrects = body.decision_id if body.corrects else None
-        return {"comprehension": body.comprehension, "enabledness": body.enabledness, "corrects": corrects}
+        return {
+            "comprehension": body.comprehension, "enabledness": body.enabledness, "corrects": corrects,
+            "author": body.author,
+        }  # fmt: skip
 
     @classmethod
     def answer_in(cls, result: dict[str, Any]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from pydantic import Field, RootModel
 
 from shift_schemas.ids import Id
 from shift_schemas.messages.base import (
+    Author,
     Command,
     Count,
     Fact,
@@ -61,6 +62,7 @@ class Config(Fact):
 
     version: Count = Field(ge=1, description="1 at the start; each change adds 1.")
     study: str = Field(description="The study in force as one JSON string.")
+    author: Author = Field(default="", description="Who changed it, if the name was given.")
 
 
 class Marker(Fact):
@@ -72,6 +74,8 @@ class Marker(Fact):
 
     marker_id: Id = Field(description="Its id.")
     text: Text = Field(description="The note.")
+    retracts: str = Field(default="", description="The earlier marker that this one retracts; '' is none.")
+    author: Author = Field(default="", description="Who set it, if the name was given.")
 
 
 START_ID, END_ID = "start", "end"
@@ -131,8 +135,11 @@ class Configure(Command):
     )  # fmt: skip
     body = PatchBody
     wording = RepeatWording("change {id} was made before", "change", "Choose another id for another change")
+    added = frozenset({"author"})
+    query_fields = frozenset({"author"})
 
     patch: JsonObject
+    author: Author = Field(default="", description="Your name, for the list of changes.")
 
     @classmethod
     def fields_in(cls, body: Any) -> dict[str, Any]:
@@ -150,5 +157,8 @@ class Mark(Command):
     id_field = "marker_id"
     id_prefix = "m-"
     wording = RepeatWording("marker {id} was set before", "marker", "Choose another marker_id for another marker")
+    added = frozenset({"retracts", "author"})
 
     text: Text
+    retracts: Id | None = Field(default=None, description="The id of an earlier marker that was a mistake.")
+    author: Author = Field(default="", description="Your name, for the list of changes.")

@@ -8,6 +8,7 @@ inputs that are there, and says so.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from pydantic import TypeAdapter
 from shift_model.random_numbers import pick, uniform
 from shift_model.vocabulary import PolicySource, Triple
 from shift_schemas.core_protocol import InputsMissing, Step, covers_gaze
-from shift_schemas.errors import FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
+from shift_schemas.errors import Conflict, FieldError, MalformedMessage, Unavailable, UnknownThing, shorten
 from shift_schemas.lifecycle import LIVE, check_accepts
 from shift_schemas.messages import (
     Command,
@@ -283,12 +284,37 @@ def _on_override(state: DeciderState, command: SetOverride, now: Stamp, timed_ou
     check_accepts(state.session, state.phase, command)
     study = _study(state, missing_inputs(state, command.need), timed_out)
     check_task(study, command.task)
-    check_strategy(study, command.strategy)
+    if command.withdraws is None:
+        check_strategy(study, command.strategy)
+        strategy = {s: command.strategy[s] for s in study.scoring.strategies}
+    else:
+        _check_withdrawal(state, command)
+        strategy = {}
     fact = Override(
         session=state.session, stamp=now, seen=_seen(state), override_id=command.command_id, task=command.task,
-        strategy={s: command.strategy[s] for s in study.scoring.strategies}, reason=command.reason,
+        strategy=strategy, reason=command.reason, withdraws=command.withdraws or "", author=command.author,
     )  # fmt: skip
-    return Step(replace(state, overrides={**state.overrides, command.task: fact}), (fact,), fact)
+    return Step(replace(state, overrides=overrides_after(state.overrides, fact)), (fact,), fact)
+
+
+def overrides_after(overrides: Mapping[str, Override], fact: Override) -> dict[str, Override]:
+    """Return the overrides that wait for a decision, by task, after another one or a withdrawal."""
+    others = {task: waiting for task, waiting in overrides.items() if task != fact.task}
+    return others if fact.withdraws else {**others, fact.task: fact}
+
+
+def _check_withdrawal(state: DeciderState, command: SetOverride) -> None:
+    """Raise an error unless the override that is withdrawn still waits for a decision of the task."""
+    if command.strategy:
+        rule = "give either a strategy, which replaces the override that waits, or withdraws"
+        raise MalformedMessage(f"strategy: {rule}", (FieldError(field="strategy", value="", rule=rule),))
+    waiting = state.overrides.get(command.task)
+    if waiting is None or waiting.override_id != command.withdraws:
+        instead = f"; {waiting.override_id} waits" if waiting else ""
+        raise Conflict(
+            f"override {command.withdraws} does not wait for a decision of task {command.task}: a decision used it, "
+            f"another override replaced it, it was withdrawn, or it never was{instead}"
+        )
 
 
 def check_task(study: Study, task: str) -> None:

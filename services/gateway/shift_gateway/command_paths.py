@@ -16,8 +16,8 @@ from shift_schemas.registry import COMMANDS
 from shift_schemas.requests import body_type
 
 from shift_gateway.gateway import Gateway
-from shift_gateway.openapi import documented_body
-from shift_gateway.problems import read_body
+from shift_gateway.openapi import documented_body, documented_query
+from shift_gateway.problems import only, read_body
 
 
 def add_commands(app: FastAPI, gateway: Gateway, commands: Iterable[type[Command]] = tuple(COMMANDS.values())) -> None:
@@ -30,7 +30,8 @@ def add_commands(app: FastAPI, gateway: Gateway, commands: Iterable[type[Command
         app.add_api_route(
             kind.route.path, handler, methods=[kind.route.method], status_code=kind.route.status, tags=[kind.route.tag],
             name=kind.route.name or kind.procedure, description=inspect.getdoc(kind),
-            openapi_extra=documented_body(body_type(kind), kind.route.media_types) if has_body else None,
+            openapi_extra=documented_query(kind)
+            | (documented_body(body_type(kind), kind.route.media_types) if has_body else {}),
         )  # fmt: skip
 
 
@@ -57,7 +58,9 @@ def _command(gateway: Gateway, kind: type[Command]) -> Callable[[str, Request], 
         else:
             await request.body()  # it is ignored, but not above the limit
             body = None
-        content, repeat = await gateway.api.command(kind, session, body)
+        given = request.query_params
+        further = {name: only(name, given.getlist(name)) for name in kind.query_fields if name in given}
+        content, repeat = await gateway.api.command(kind, session, body, **further)
         return JSONResponse(content, 200 if repeat else status)
 
     return command

@@ -81,7 +81,7 @@ class GatewayApi(MeshApi):
         return {**json.loads(view.config.study), "version": view.config.version}
 
     async def command(
-        self, kind: type[Command], session: str, body: BaseModel | None = None
+        self, kind: type[Command], session: str, body: BaseModel | None = None, **further: str
     ) -> tuple[dict[str, Any], bool]:
         """Carry out a command. A patch may contain the ``version`` as it was read: it is checked, and left out."""
         if isinstance(body, PatchBody) and "version" in body.root:
@@ -92,7 +92,7 @@ class GatewayApi(MeshApi):
                     f"version: {rule}", (FieldError(field="version", value=shorten(given), rule=rule),)
                 )
             body = PatchBody({name: v for name, v in body.root.items() if name != "version"})
-        return await super().command(kind, session, body)
+        return await super().command(kind, session, body, **further)
 
     async def preview(self, session: str, task: str) -> dict[str, Any]:
         """Return what a decision made now would carry; the decider's own core runs on the read model.

@@ -29,7 +29,7 @@ from shift_schemas.messages import (
 from shift_schemas.timestamps import Stamp
 
 from shift_learner.learner import Context, Taken, state_names, state_of
-from shift_learner.reports import CORRECTABLE, check_known, performance_of, repeats, with_report
+from shift_learner.reports import CORRECTABLE, check_known, performance_of, repeats, with_report, without_report
 from shift_learner.state import LearnerState, OpenDecision, Reported, context_of, dump, load
 
 __all__ = ["CORRECTABLE", "LearnerState", "context_of", "dump", "load", "step"]
@@ -144,8 +144,13 @@ def _on_end(state: LearnerState, now: Stamp) -> Step[LearnerState]:
 
 
 def _learn(state: LearnerState, performance: Performance, now: Stamp) -> Step[LearnerState]:
-    """Learn from a report at once, unless the learner needs the next decision and there is none yet."""
+    """Learn from a report at once, unless the learner needs the next decision and there is none yet.
+
+    While the learner is paused, the report is recorded and its reward counts, but nothing is learned from it.
+    """
     facts: tuple[Fact, ...] = (performance,)
+    if state.context.study.learner.paused:
+        return replace(_with_policy(without_report(state, performance.decision_id), facts, now), result=performance)
     known = state.open[performance.decision_id]
     waits = state.learner.needs_following(state.context) and known.following is None
     if not waits:
@@ -168,11 +173,7 @@ def _update(state: LearnerState, decision_id: str, now: Stamp) -> tuple[LearnerS
         value=learner.row(context, memory, row).values[known.taken.action],
     )  # fmt: skip
     after = replace(
-        state,
-        memory=memory,
-        open={i: o for i, o in state.open.items() if i != decision_id},
-        rewards={i: r for i, r in state.rewards.items() if i != decision_id},
-        reported=_with_following(state, decision_id, known),
+        without_report(state, decision_id), memory=memory, reported=_with_following(state, decision_id, known)
     )
     return after, transition
 

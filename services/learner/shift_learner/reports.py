@@ -65,7 +65,8 @@ def performance_of(
         session=state.session, stamp=now, seen=state.seen, decision_id=command.decision_id,
         task=task, n=state.performances + 1, comprehension=comprehension, enabledness=enabledness, reward=gained,
         cumulative_reward=state.cumulative_reward + gained - (before.reward if before else 0.0),
-        corrects=before is not None, **(_format_2_fields(state, command, task, before) if state.format > 1 else {}),
+        corrects=before is not None, author=command.author,
+        **(_format_2_fields(state, command, task, before) if state.format > 1 else {}),
     )  # fmt: skip
 
 
@@ -90,6 +91,15 @@ def with_report(state: LearnerState, performance: Performance, known: OpenDecisi
         open={**state.open, decision_id: state.open.get(decision_id, known)},
         reported=kept | {decision_id: Reported(known, performance)} if state.format > 1 else {},
         results={**state.results, task: max(performance.result, state.results.get(task, 0))},
+    )
+
+
+def without_report(state: LearnerState, decision_id: str) -> LearnerState:
+    """Return the state in which a report does not wait any more to be learned from."""
+    return replace(
+        state,
+        open={i: o for i, o in state.open.items() if i != decision_id},
+        rewards={i: r for i, r in state.rewards.items() if i != decision_id},
     )
 
 

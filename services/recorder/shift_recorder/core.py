@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 from pydantic import TypeAdapter
@@ -56,6 +56,8 @@ class RecorderState:
     config: Config
     original: str
     """The study as JSON, as it was given, without the condition's changes; it is attached to the recording."""
+    markers: dict[str, bool] = field(default_factory=dict)
+    """Each marker's id, and whether a later marker retracted it."""
 
 
 _STATE = TypeAdapter(RecorderState)
@@ -178,7 +180,10 @@ def _configure(state: RecorderState, command: Configure, now: Stamp) -> Step[Rec
     before = study_from_json(state.config.study)
     after = patched(before, command.patch)
     check_changeable(before, after)
-    config = Config(session=command.session, stamp=now, version=state.config.version + 1, study=study_json(after))
+    config = Config(
+        session=command.session, stamp=now, version=state.config.version + 1,
+        study=study_json(after), author=command.author,
+    )  # fmt: skip
     return Step(replace(state, config=config), (config,), config_answer(config))
 
 
@@ -199,5 +204,20 @@ def check_changeable(before: Study, after: Study) -> None:
 
 def _mark(state: RecorderState, command: Mark, now: Stamp) -> Step[RecorderState]:
     check_accepts(command.session, state.fact.state, command)
-    fact = Marker(session=command.session, stamp=now, marker_id=command.command_id, text=command.text)
-    return Step(state, (fact,), fact)
+    markers = {**state.markers, command.command_id: False}
+    if command.retracts is not None:
+        _check_retractable(state, command.retracts)
+        markers[command.retracts] = True
+    fact = Marker(
+        session=command.session, stamp=now, marker_id=command.command_id, text=command.text,
+        retracts=command.retracts or "", author=command.author,
+    )  # fmt: skip
+    return Step(replace(state, markers=markers), (fact,), fact)
+
+
+def _check_retractable(state: RecorderState, marker: str) -> None:
+    """Raise an error unless the session has this marker and no marker retracted it."""
+    if marker not in state.markers:
+        raise UnknownThing(f"session {state.fact.session} has no marker {marker} that could be retracted")
+    if state.markers[marker]:
+        raise Conflict(f"marker {marker} is retracted already")

@@ -9,8 +9,8 @@ import secrets
 from functools import partial
 from typing import Any
 
-from pydantic import BaseModel
-from shift_schemas.errors import Unavailable, UnknownThing
+from pydantic import BaseModel, ValidationError
+from shift_schemas.errors import Unavailable, UnknownThing, malformed
 from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Answer, Command, Decide, GazeChunk, Mark, ReportPerformance, StartSession
 from shift_schemas.requests import PerformanceBody, body_type
@@ -35,7 +35,7 @@ class MeshApi:
         self.read_model = read_model
 
     async def command(
-        self, kind: type[Command], session: str, body: BaseModel | None = None
+        self, kind: type[Command], session: str, body: BaseModel | None = None, **further: str
     ) -> tuple[dict[str, Any], bool]:
         """Carry out a command in a session that exists. Return its result, and whether it was carried out before.
 
@@ -43,12 +43,17 @@ class MeshApi:
         ----------
         body
             An instance of the command's :func:`body_type`; None for a command without a body.
+        further
+            The fields that are not in the body (``query_fields`` of the command).
         """
         view = await self.read_model.view(session)
-        command = kind(
-            command_id=kind.id_in(body) or new_id(kind.id_prefix), session=session, need=view.required,
-            **(kind.fields_in(body) if body is not None else {}),
-        )  # fmt: skip
+        fields = {**(kind.fields_in(body) if body is not None else {}), **further}
+        try:
+            command = kind(
+                command_id=kind.id_in(body) or new_id(kind.id_prefix), session=session, need=view.required, **fields
+            )
+        except ValidationError as e:
+            raise malformed(kind.procedure, e) from e
         if isinstance(command, ReportPerformance) and not has_ended(view.fact.state):
             await self._check_decision(session, view, command.decision_id)
         answer = await self.mesh.command(command, await self._wait_s(view) if kind.wait_s is None else kind.wait_s)

@@ -168,7 +168,9 @@ def _fold(view: SessionView, fact: Fact) -> None:
             view.n = fact.n
             view.decisions[fact.decision_id] = fact.task
             view.overrides.pop(fact.task, None)
-        case Override():
+        case Override(withdraws=""):
             view.overrides[fact.task] = fact
+        case Override():
+            view.overrides.pop(fact.task, None)
         case Performance():
             view.performances = fact.n

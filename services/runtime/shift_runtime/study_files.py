@@ -53,7 +53,8 @@ def check_file(path: Traversable, place: str) -> CheckedStudy:
         study = parse_study(_text(path), path.name)
     except InvalidStudy as e:
         return CheckedStudy(name, place, None, e.sentences, (), e)
-    return CheckedStudy(name, place, study, (), (*_name_warnings(study, path), *study_warnings(study)), None)
+    warnings = (*_name_warnings(study, path), *_stimulus_warnings(study, path), *study_warnings(study))
+    return CheckedStudy(name, place, study, (), warnings, None)
 
 
 def list_studies(folder: Path) -> list[CheckedStudy]:
@@ -167,6 +168,12 @@ def _name_warnings(study: Study, path: Traversable) -> Iterator[str]:
             f"{path.name}: sessions are started with {stem!r}, the file's name, and recorded under {study.study!r}, "
             f"its study; write study: {stem}, or rename the file to {study.study}.yaml"
         )
+
+
+def _stimulus_warnings(study: Study, path: Traversable) -> Iterator[str]:
+    """Warn if the stimulus image does not lie beside the study file."""
+    if study.stimulus is not None and not (isinstance(path, Path) and (path.parent / study.stimulus).is_file()):
+        yield f"stimulus: there is no image {study.stimulus} beside the study file; the page draws the AOIs alone"
 
 
 def _refused(name: str, rule: str) -> InvalidStudy:

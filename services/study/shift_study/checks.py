@@ -13,7 +13,7 @@ from shift_model.thresholds import below
 from shift_model.vocabulary import TRIPLES
 
 from shift_study.area_checks import area_warnings
-from shift_study.learner_settings import LEARNER_SETTINGS, LearnerSettings, parameters_of
+from shift_study.learner_settings import COMMON, LEARNER_SETTINGS, LearnerSettings, parameters_of
 from shift_study.loading import study_in_force
 from shift_study.scoring import scores
 from shift_study.scoring_table import ScoringTable
@@ -120,7 +120,7 @@ def _unused_parameters(study: Study) -> Iterator[str]:
 
 def _given(settings: LearnerSettings) -> list[str]:
     """Return the parameters that were written; if all are written, those that differ from their default."""
-    parameters = [key for key in LearnerSettings.model_fields if key != "name"]
+    parameters = [key for key in LearnerSettings.model_fields if key not in COMMON]
     written = [key for key in parameters if key in settings.model_fields_set]
     if len(written) < len(parameters):
         return written
@@ -129,7 +129,9 @@ def _given(settings: LearnerSettings) -> list[str]:
 
 def _written(patch: Any) -> list[str]:
     return (
-        [key for key, value in patch.items() if key != "name" and value is not None] if isinstance(patch, dict) else []
+        [key for key, value in patch.items() if key not in COMMON and value is not None]
+        if isinstance(patch, dict)
+        else []
     )
 
 

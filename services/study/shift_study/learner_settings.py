@@ -20,6 +20,9 @@ class LearnerChoice(StudyPart):
     """The name of the learner; a learner without parameters has nothing more."""
 
     name: LearnerName = Field(default="q-learning", description="The learner; fixed for a session.")
+    paused: bool = Field(
+        default=False, description="Whether reports are recorded without being learned from; any learner."
+    )
 
 
 # --- parameters that several learners read ---
@@ -128,6 +131,10 @@ LEARNER_SETTINGS: dict[str, type[LearnerChoice]] = {
 """The class that holds the parameters of each learner."""
 
 
+COMMON = frozenset(LearnerChoice.model_fields)
+"""What every learner has: its name, and whether it is paused."""
+
+
 def parameters_of(learner: str) -> frozenset[str]:
     """Return the parameters that the learner of this name reads."""
-    return frozenset(LEARNER_SETTINGS.get(learner, LearnerChoice).model_fields) - {"name"}
+    return frozenset(LEARNER_SETTINGS.get(learner, LearnerChoice).model_fields) - COMMON

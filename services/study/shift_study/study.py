@@ -20,7 +20,7 @@ from shift_study.constants import (
     FixationSettings,
     RewardSettings,
 )
-from shift_study.fields import StudyPart
+from shift_study.fields import StimulusFile, StudyPart
 from shift_study.learner_settings import LearnerSettings
 from shift_study.scoring_table import ScoringSettings
 
@@ -43,6 +43,12 @@ class Study(StudyPart):
     )
     require_condition: bool = Field(
         default=False, description="Whether a start without a condition is refused; chosen: a warning only."
+    )
+    blinded: bool = Field(
+        default=False, description="Whether the web page hides the condition while a session runs; chosen: no."
+    )
+    stimulus: StimulusFile | None = Field(
+        default=None, description="Image that the web page draws under the AOIs: a file in the folder of the studies."
     )
     conditions: Annotated[dict[Id, dict[str, Any]], Field(max_length=32)] = Field(
         default={}, description="Each overrides parts of what stands below it."
@@ -108,6 +114,8 @@ CONDITIONAL: frozenset[str] = frozenset(Study.model_fields) - {
     "tasks",
     "aois",
     "require_condition",
+    "blinded",
+    "stimulus",
     "conditions",
 }
 """What a condition can override."""

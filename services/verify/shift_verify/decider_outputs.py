@@ -181,6 +181,7 @@ def override_command(fact: Override) -> SetOverride:
     """Return the command that an override answers. What the caller required is not recorded and changes nothing."""
     return SetOverride(
         command_id=fact.override_id, session=fact.session, task=fact.task, strategy=fact.strategy, reason=fact.reason,
+        withdraws=fact.withdraws or None, author=fact.author,
     )  # fmt: skip
 
 

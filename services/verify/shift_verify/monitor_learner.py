@@ -142,6 +142,7 @@ def _report_of(fact: Performance) -> ReportPerformance:
         corrects=fact.decision_id if fact.corrects else None,
         comprehension=_result_of(fact.comprehension),
         enabledness=_result_of(fact.enabledness),
+        author=fact.author,
     )
 
 

@@ -120,9 +120,10 @@ class RecorderFold:
                 after = step(state, EndSession(command_id=END_ID, session=fact.session), now)
             case Config():
                 patch = merge_patch_between(json.loads(state.config.study), json.loads(fact.study))
-                after = step(state, Configure(command_id="change", session=fact.session, patch=patch), now)
+                change = Configure(command_id="change", session=fact.session, patch=patch, author=fact.author)
+                after = step(state, change, now)
             case Marker():
-                after = step(state, Mark(command_id=fact.marker_id, session=fact.session, text=fact.text), now)
+                after = step(state, mark_command(fact), now)
             case _:
                 differ(placed, "", fact.subject, None, "the recorder publishes no such message")
         if not after.facts:
@@ -136,6 +137,14 @@ def _start_of(start: Session, study: dict[str, Any]) -> StartSession:
         command_id=START_ID, session=start.session, participant=start.participant, study=study, seed=start.seed,
         condition=start.condition, replay_of=start.replay_of, software=start.software, revision=start.revision,
         format=start.format,
+    )  # fmt: skip
+
+
+def mark_command(fact: Marker) -> Mark:
+    """Return the command that a marker answers."""
+    return Mark(
+        command_id=fact.marker_id, session=fact.session, text=fact.text, retracts=fact.retracts or None,
+        author=fact.author,
     )  # fmt: skip
 
 

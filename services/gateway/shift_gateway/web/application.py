@@ -13,6 +13,7 @@ from nicegui import ui
 
 from shift_gateway.docs_page import ICON
 from shift_gateway.gateway import Gateway
+from shift_gateway.web.desk_page import add_desk_page
 from shift_gateway.web.live_histories import LiveHistories
 from shift_gateway.web.recordings_page import add_recordings_page
 from shift_gateway.web.room_page import add_room_page
@@ -28,6 +29,7 @@ def make_pages(gateway: Gateway) -> FastAPI:
     nicegui_app.add_static_files("/page-assets", ASSETS, max_cache_age=0)
     histories = LiveHistories(gateway)
     add_room_page(gateway, histories)
+    add_desk_page(gateway, histories)
     add_recordings_page(gateway)
     ui.run_with(
         app, title="SHIFT mesh", favicon=ICON, dark=None, language="en-US", tailwind=False, show_welcome_message=False,

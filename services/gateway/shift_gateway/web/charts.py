@@ -6,9 +6,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
+from shift_schemas.timestamps import NS
+
 from shift_gateway.web.history import SessionHistory
 from shift_gateway.web.room_view import WINDOW_S
 
+POINT_NS = NS // 2
+"""The strip has at most one point in this time, ns; chosen."""
 GAP_S = 1.0
 """A longer time without a valid sample is drawn as a gap, seconds; chosen."""
 
@@ -54,10 +58,14 @@ def strip_options(aois: Sequence[str], threshold: float) -> dict[str, Any]:
 
 
 def strip_points(history: SessionHistory, after_ns: int, until_ns: int) -> list[list[Any]]:
-    """Return the new points of the strip: time in ms, capacity, focus shift, AOI ('' is none)."""
+    """Return the new points of the strip: time in ms, capacity, focus shift, AOI ('' is none).
+
+    Of the observations within :data:`POINT_NS`, which is three pixels, the last one counts.
+    """
+    last = {ns // POINT_NS: (ns, point) for ns, point in history.observations.between(after_ns, until_ns)}
     return [
         [ns // 1_000_000, round(point.capacity, 4), round(point.focus_shift, 4), point.aoi]
-        for ns, point in history.observations.between(after_ns, until_ns)
+        for ns, point in last.values()
     ]
 
 

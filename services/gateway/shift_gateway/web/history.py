@@ -68,6 +68,10 @@ class Series(Generic[T]):
         index = bisect_right(self.times, ns)
         return self.items[index - 1] if index else None
 
+    def count(self, ns: int = END_OF_TIME) -> int:
+        """Return how many entries there are up to and including a time."""
+        return bisect_right(self.times, ns)
+
     def forget_before(self, ns: int) -> None:
         """Remove the entries before a time, except the last of them."""
         count = bisect_right(self.times, ns) - 1

@@ -161,8 +161,8 @@ class ExclusionDialog:
         with ui.dialog() as self._dialog, ui.card():
             self._title = text("", tag="h2")
             text("The recording does not change. The reason is kept beside it, with your name and the time.", "muted")
-            self._reason = testid(ui.input("Reason"), "exclusion-reason").classes("wide")
-            self._author = testid(ui.input("Your name or initials"), "exclusion-author").classes("wide")
+            self._reason = testid(ui.input("Reason"), "exclusion-reason").classes("dialog-field")
+            self._author = testid(ui.input("Your name or initials"), "exclusion-author").classes("dialog-field")
             with ui.row():
                 self._button = testid(ui.button("Exclude", on_click=self._write).props("outline"), "exclusion-confirm")
                 ui.button("Cancel", on_click=self._dialog.close).props("flat")

@@ -10,6 +10,7 @@ from shift_schemas.errors import ShiftError
 from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import EndSession, Mark, SetOverride
 from shift_schemas.requests import body_type
+from shift_schemas.timestamps import NS
 from shift_study.study import Study
 
 from shift_gateway.gateway import Gateway
@@ -21,6 +22,8 @@ from shift_gateway.web.live_page import live_session_page
 from shift_gateway.web.room_elements import GazeSources, RoomElements, stimulus_script
 from shift_gateway.web.room_view import WINDOW_S, RoomView, room_view
 
+STRIP_NS = NS
+"""The strip is drawn once a second: a second is six pixels of its three minutes."""
 STRIP = "The last three minutes. Hatched: no valid gaze. Solid lines: decisions. Dotted lines: markers."
 
 
@@ -42,7 +45,7 @@ class RoomPage:
         self._history = history
         self._shown = RoomView()
         self._marks: dict[str, Any] = {}
-        self._until_ns = 0
+        self._until_ns = self._drawn_ns = 0
         study = history.study() or Study(study="default")
         self._elements = RoomElements(study)
         with ui.element("main").classes("room"):
@@ -147,13 +150,20 @@ class RoomPage:
         if view != self._shown:
             self._show(view)
             self._shown = view
+        return stimulus_script(view) + self._strip_script(now_ns)
+
+    def _strip_script(self, now_ns: int) -> str:
+        """Return the JavaScript that adds to the strip what is new, every :data:`STRIP_NS`."""
+        if now_ns < self._drawn_ns + STRIP_NS:
+            return ""
+        self._drawn_ns = now_ns
         points = strip_points(self._history, self._until_ns, now_ns)
         self._until_ns = self._history.observations.times[-1] if self._history.observations.times else 0
         marks = strip_marks(self._history, now_ns)
         changed = {k: v for k, v in marks.items() if v != self._marks.get(k)}
         self._marks = marks
-        given = (self._strip.id, now_ns // 1_000_000, json.dumps(points), json.dumps(changed))
-        return "shift.stripUpdate({}, {}, {}, {}); ".format(*given) + stimulus_script(view)
+        given = json.dumps(points), json.dumps(changed)
+        return "shift.stripUpdate({}, {}, {}, {});".format(self._strip.id, now_ns // 1_000_000, *given)
 
     def _show(self, view: RoomView) -> None:
         self._title.text = f"{view.participant} · {view.study} · {view.elapsed} ·"

@@ -18,6 +18,8 @@
       splitLine: { lineStyle: { color: c.line } }, nameTextStyle: { color: c.text } }));
     const update = { color: c.series, textStyle: { color: c.text }, legend: { textStyle: { color: c.text } },
       xAxis: axes(options.xAxis), yAxis: axes(options.yAxis) };
+    update.series = (options.series || []).map((s) =>
+      (s.label && s.label.show ? { label: { color: c.text, textBorderWidth: 0 } } : {}));
     if (options.visualMap && options.visualMap.length) update.visualMap = [{ textStyle: { color: c.text } }];
     chart.setOption(update);
   };
@@ -60,6 +62,64 @@
     return hatches[colour];
   };
 
+  // Runs when the element is there: its script can come before the browser has made it.
+  const later = (id, find, use, tries = 40) => {
+    const found = find();
+    if (found) use(found); else if (tries) setTimeout(() => later(id, find, use, tries - 1), 50);
+  };
+  const made = (tag, parent, classes) => {
+    const e = document.createElement(tag);
+    if (classes) e.className = classes;
+    parent.append(e);
+    return e;
+  };
+  const words = (parent, text) => { // text only, never markup; a long word can break after an underscore
+    String(text).split('_').forEach((part, i) => {
+      if (i) parent.append('_', document.createElement('wbr'));
+      parent.append(part);
+    });
+  };
+  const fillCell = (td, cell) => {
+    if (typeof cell === 'string') { words(td, cell); return; }
+    if (cell.classes) td.className = cell.classes;
+    if (cell.name) td.dataset.testid = cell.name;
+    if (cell.heat !== undefined) td.style.setProperty('--heat', `${Math.round(50 * cell.heat)}%`);
+    if (cell.button) {
+      const b = cell.button, button = made('button', td, 'in-table');
+      button.type = 'button'; button.textContent = b.text; button.setAttribute('aria-label', b.label);
+      button.dataset.key = b.label;
+      if (b.name) button.dataset.testid = b.name;
+      button.addEventListener('click', () => emitEvent(b.event, b.value));
+    }
+    if (cell.text) words(td, cell.text);
+    if (cell.small) { td.append(' '); words(made('small', td), cell.small); }
+    if (cell.bar !== undefined) made('i', made('span', td, 'cell-bar')).style.width = `${100 * cell.bar}%`;
+  };
+  const fillTable = (table, headings, rows) => { // white space between cells, so that their text reads as words
+    const focus = table.contains(document.activeElement) ? document.activeElement.dataset.key : undefined;
+    table.replaceChildren();
+    table.style.setProperty('--columns', headings.length);
+    if (headings.length) {
+      const tr = made('tr', made('thead', table));
+      for (const [text, title] of headings) {
+        const th = made('th', tr);
+        th.scope = 'col'; words(th, text); tr.append(' ');
+        if (title) th.title = title;
+      }
+    }
+    const body = made('tbody', table);
+    for (const row of rows) {
+      const tr = made('tr', body, row.classes);
+      if (row.name) tr.dataset.testid = row.name;
+      row.cells.forEach((cell, i) => {
+        const td = made(i ? 'td' : 'th', tr);
+        if (!i) td.scope = 'row';
+        fillCell(td, cell); tr.append(' ');
+      });
+    }
+    if (focus) [...table.querySelectorAll('button')].find((b) => b.dataset.key === focus)?.focus();
+  };
+
   const shift = window.shift = {
     strip(id, windowMs, threshold) { strips[id] = { windowMs, threshold, points: [], decisions: [], markers: [], gaps: [] }; },
     stripUpdate(id, nowMs, points, marks) {
@@ -81,6 +141,12 @@
         for (const shape of svg.querySelectorAll('[data-aoi]'))
           shape.classList.toggle('looked-at', aois.includes(shape.dataset.aoi));
       }
+    },
+    table(id, headings, rows) { later(id, () => document.getElementById(`c${id}`), (table) => fillTable(table, headings, rows)); },
+    chart(id, update) { later(id, () => chartOf(id), (chart) => { chart.setOption(update); themed(chart); }); },
+    author(name) {
+      if (name !== undefined) localStorage.setItem('shift-author', name);
+      return localStorage.getItem('shift-author') || '';
     },
     heard(ms) { shift.last = Date.now(); shift.lastText = new Date(ms).toLocaleTimeString(); shift.mark(); },
     mark() {
