@@ -15,6 +15,7 @@ from shift_gateway.docs_page import ICON
 from shift_gateway.gateway import Gateway
 from shift_gateway.web.desk_page import add_desk_page
 from shift_gateway.web.live_histories import LiveHistories
+from shift_gateway.web.recording_page import add_recording_page
 from shift_gateway.web.recordings_page import add_recordings_page
 from shift_gateway.web.room_page import add_room_page
 
@@ -31,6 +32,7 @@ def make_pages(gateway: Gateway) -> FastAPI:
     add_room_page(gateway, histories)
     add_desk_page(gateway, histories)
     add_recordings_page(gateway)
+    add_recording_page(gateway)
     ui.run_with(
         app, title="SHIFT mesh", favicon=ICON, dark=None, language="en-US", tailwind=False, show_welcome_message=False,
         reconnect_timeout=RECONNECT_S, gzip_middleware_factory=None, binding_refresh_interval=None,

@@ -1,4 +1,4 @@
-"""What the page of a recording shows: its time line, the table of its events, and why a decision was made. Pure."""
+"""What the page of a recording shows: its time line and the table of its events. Pure."""
 
 from __future__ import annotations
 
@@ -6,22 +6,25 @@ import json
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
-from shift_schemas.messages import Config, Decision
+from shift_schemas.messages import Config, Decision, Override
 
 from shift_gateway.web.charts import gaps, shortened
 from shift_gateway.web.history import END_OF_TIME, SessionHistory
 from shift_gateway.web.recording_history import RecordingHistory
 from shift_gateway.web.recording_summary import is_blinded
 from shift_gateway.web.recordings_view import BLINDED
-from shift_gateway.web.wording import date_and_time, duration, levels, origin, reasons
+from shift_gateway.web.table_rows import Button, Cell, Row
+from shift_gateway.web.wording import date_and_time, duration, levels, origin
 
 MOST_POINTS = 3000
 """A curve has at most this many points; more would not be seen on a screen. Chosen."""
 LINKED = 4
 """The number of charts that share the time axis."""
 TIME_AXIS = {"type": "value", "axisLabel": {":formatter": "shift.position"}, "axisTick": {"show": False}}
-NEUTRAL, CURSOR = "rgba(125,135,145,.35)", "#d1495b"
+NEUTRAL, CURSOR, FIRST, SECOND = "rgba(125,135,145,.35)", "#d1495b", "#1a85c4", "#d55e00"
 """Colours that are seen on light and on dark ground."""
+SEEK = "recording-seek"
+"""The browser's event for a position that was chosen in the time line or in the table, seconds."""
 EventKind = Literal["session", "decision", "result", "override", "marker", "change", "gap"]
 
 
@@ -94,7 +97,7 @@ def timeline_options(recording: RecordingHistory) -> dict[str, Any]:
             *_curves(recording), _markers(recording),
             _steps("state", 1, [[s, d.cognitive_state] for s, d in decisions], length),
             _steps("strategy", 2, [[s, levels(d.strategy)] for s, d in decisions], length),
-            *_rewards(recording), *_cursors(),
+            *_rewards(recording), _cursor(),
         ],
     }  # fmt: skip
 
@@ -140,30 +143,28 @@ def _steps(name: str, axis: int, data: list[list[Any]], length: float) -> dict[s
     """Return a line that stays at each value until the next one. The last value lasts until the end."""
     return {
         "name": name, "type": "line", "step": "end", "xAxisIndex": axis, "yAxisIndex": axis, "symbolSize": 7,
-        "symbol": "circle", "showSymbol": len(data) <= 200, "lineStyle": {"width": 2},
+        "symbol": "circle", "color": FIRST, "showSymbol": len(data) <= 200, "lineStyle": {"width": 2},
         "data": [*data, {"value": [length, data[-1][1]], "symbol": "none"}] if data else [],
     }  # fmt: skip
 
 
 def _rewards(recording: RecordingHistory) -> list[dict[str, Any]]:
     results = [(recording.position_s(ns), p) for ns, p in _entries(recording.history, "performances")]
+    axes = {"xAxisIndex": 3, "color": SECOND}
+    sums = [[s, round(p.cumulative_reward, 4)] for s, p in results]
     return [
-        {"name": "reward", "type": "bar", "barWidth": 4, "xAxisIndex": 3, "yAxisIndex": 3,
-         "data": [[s, round(p.reward, 4)] for s, p in results]},
-        {"name": "cumulative reward", "type": "line", "step": "end", "showSymbol": False, "xAxisIndex": 3,
-         "yAxisIndex": 4, "lineStyle": {"width": 2}, "data": [[s, round(p.cumulative_reward, 4)] for s, p in results]},
+        {"name": "reward", "type": "scatter", "symbol": "diamond", "symbolSize": 10, "yAxisIndex": 3,
+         "data": [[s, round(p.reward, 4)] for s, p in results], **axes},
+        {"name": "cumulative reward", "type": "line", "step": "end", "showSymbol": False, "yAxisIndex": 4,
+         "lineStyle": {"width": 2}, "data": sums, **axes, "color": FIRST},
     ]  # fmt: skip
 
 
-def _cursors() -> list[dict[str, Any]]:
-    """Return a line without points for each chart, which carries the cursor."""
+def _cursor() -> dict[str, Any]:
+    """Return a line without points that carries the cursor, which the browser moves (``shift.cursor``)."""
     style = {"color": CURSOR, "width": 2, "type": "solid"}
     mark = {"silent": True, "symbol": "none", "animation": False, "label": {"show": False}, "lineStyle": style}
-    return [
-        {"id": f"cursor{i}", "type": "line", "xAxisIndex": i, "yAxisIndex": i, "data": [],
-         "markLine": {**mark, "data": [{"xAxis": 0}]}}
-        for i in range(LINKED)
-    ]  # fmt: skip
+    return {"id": "cursor", "type": "line", "data": [], "markLine": {**mark, "data": []}}
 
 
 def thinned(points: list[tuple[float, float]], most: int = MOST_POINTS) -> list[list[float]]:
@@ -200,13 +201,22 @@ def events(recording: RecordingHistory) -> list[Event]:
     add("sessions", "session", lambda s: f"the session is {s.state}")
     add("decisions", "decision", _decision_text)
     add("performances", "result", _result_text)
-    add("overrides", "override", lambda o: f"next {o.task}: {levels(o.strategy) or 'no override'} {o.reason}".strip())
-    add("markers", "marker", lambda m: m.text)
+    add("overrides", "override", _override_text)
+    retracted = {m.retracts for m in history.markers.items if m.retracts}
+    add("markers", "marker", lambda m: m.text + (" (retracted later)" if m.marker_id in retracted else ""))
     found += [
         Event(recording.position_s(ns), "change", f"configuration {after.version}: {changed_keys(before, after)}")
         for (_, before), (ns, after) in pairwise(_entries(history, "configs"))
     ]
     return sorted(found, key=lambda event: event.position_s)
+
+
+def event_rows(found: list[Event]) -> list[Row]:
+    """Return the rows of the table: the position is a button that moves the cursor there."""
+    return [
+        Row([Cell(button=Button(duration(at), SEEK, round(at, 3), f"Go to {at:.1f} s")), kind, what])
+        for at, kind, what in found
+    ]
 
 
 def changed_keys(before: Config, after: Config) -> str:
@@ -227,6 +237,11 @@ def _decision_text(decision: Decision) -> str:
     return f"{where} ({origin(decision)})"
 
 
+def _override_text(override: Override) -> str:
+    what = f"withdraws the override of {override.task}" if override.withdraws else f"next {override.task}: "
+    return ", ".join(part for part in (what + levels(override.strategy), override.reason, override.author) if part)
+
+
 def _result_text(result: Any) -> str:
     sides = [
         f"{name} {'success' if side.success else 'failure'} in {side.duration_s:g} s"
@@ -237,63 +252,6 @@ def _result_text(result: Any) -> str:
     return f"{result.task}: {', '.join(sides)}; {reward}{corrected}"
 
 
-# --- the decision under the cursor ---
-
-
-class Choice(NamedTuple):
-    """One action that the decision could have taken."""
-
-    strategy: str
-    probability: float
-    value: float | None
-    """The learner's value in the decision's state; None if the policy is not in the recording."""
-    visits: int | None
-    chosen: bool
-    suggested: bool
-
-
-class Explanation(NamedTuple):
-    """Why the last decision was made."""
-
-    lines: tuple[tuple[str, str], ...] = ()
-    """Label and value."""
-    choices: tuple[Choice, ...] = ()
-
-
-def explanation(history: SessionHistory, at_ns: int = END_OF_TIME) -> Explanation:
-    """Return why the last decision at a time was made; empty before the first decision."""
-    decision = history.decisions.last(at_ns)
-    if decision is None:
-        return Explanation()
-    policy = next((p for p in history.policies.until(at_ns) if p.version == decision.versions.policy), None)
-    row = policy.states.get(decision.state) if policy else None
-    result = history.performance_of(decision.decision_id, at_ns)
-    lines = (
-        ("observation", reasons(decision.observation)),
-        ("scores", ", ".join(f"{name} {score:.3f}" for name, score in decision.scores.items())),
-        ("state", decision.cognitive_state),
-        ("suggested by the scoring table", levels(decision.suggested)),
-        ("chosen", f"{levels(decision.strategy)} ({origin(decision)})"),
-        ("exploration rate", f"{policy.epsilon:.3f}" if policy and policy.epsilon is not None else "none"),
-        ("reward", f"{result.reward:+.3f}" if result else "no result yet"),
-        ("cumulative reward", f"{_cumulative(history, at_ns):+.3f}"),
-    )
-    choices = [
-        Choice(
-            levels(action), p, row.values[i] if row and i < len(row.values) else None,
-            row.visits[i] if row and i < len(row.visits) else None,
-            action == decision.strategy, action == decision.suggested,
-        )
-        for i, (action, p) in enumerate(zip(decision.actions, decision.probabilities, strict=False))
-    ]  # fmt: skip
-    return Explanation(lines, tuple(choices))
-
-
-def _cumulative(history: SessionHistory, at_ns: int) -> float:
-    last = history.performances.last(at_ns)
-    return last.cumulative_reward if last else 0.0
-
-
 def _entries(history: SessionHistory, name: str) -> list[tuple[int, Any]]:
     return list(getattr(history, name).between(-1, END_OF_TIME))
 
@@ -301,4 +259,3 @@ def _entries(history: SessionHistory, name: str) -> list[tuple[int, Any]]:
 def _names(values: list[str]) -> list[str]:
     """Return the different values in the order in which they are first seen, from the top of the chart down."""
     return list(dict.fromkeys(values))[::-1]
-

@@ -123,7 +123,7 @@ class RecordingsPage:
             async for found, total in summaries.of(self._folder):
                 self._summaries = found
                 missing = [s.name for s in found if s.name not in self._exclusions]
-                self._exclusions |= await asyncio.to_thread(_exclusions, self._folder, missing)
+                self._exclusions |= await asyncio.to_thread(exclusions_of, self._folder, missing)
                 self._progress.value = len(found) / total if total else 1
                 self._progress.set_visibility(len(found) < total)
                 self._progress_text.text = f"{len(found)} of {total} recordings are read."
@@ -197,7 +197,7 @@ class ExclusionDialog:
         self._dialog.close()
 
 
-def _exclusions(folder: Path, names: list[str]) -> dict[str, Exclusion | str]:
+def exclusions_of(folder: Path, names: list[str]) -> dict[str, Exclusion | str]:
     """Return the exclusion of each recording; a text if its file cannot be read."""
     found: dict[str, Exclusion | str] = {}
     for name in names:
