@@ -30,6 +30,7 @@ from shift_gateway.web.recordings_page import exclusions_of
 from shift_gateway.web.recordings_view import exclusion_text
 from shift_gateway.web.room_elements import GazeSources, RoomElements, stimulus_script
 from shift_gateway.web.room_view import room_view
+from shift_gateway.web.table_rows import Row
 from shift_gateway.web.verify_panel import VerifyPanel
 from shift_gateway.web.wording import duration
 
@@ -76,17 +77,18 @@ async def _load(path: Path, main: ui.element, heading: ui.label) -> None:
 
     await read_history(path, recording, on_progress)
     excluded = exclusion_text((await asyncio.to_thread(exclusions_of, path.parent, [path.name]))[path.name])
+    drawn = await asyncio.to_thread(lambda: (timeline_options(recording), event_rows(events(recording))))
     label.delete()
     bar.delete()
     heading.delete()
     with main:
-        RecordingPage(path, recording, excluded)
+        RecordingPage(path, recording, excluded, *drawn)
 
 
 class RecordingPage:
     """The elements of one open recording."""
 
-    def __init__(self, path: Path, recording: RecordingHistory, excluded: str) -> None:
+    def __init__(self, path: Path, recording: RecordingHistory, excluded: str, options: Any, rows: list[Row]) -> None:
         self._path = path
         self._recording = recording
         self._history = recording.history
@@ -96,7 +98,7 @@ class RecordingPage:
         self._head(excluded)
         if recording.length_s:
             self._playback()
-            self._timeline_panel()
+            self._timeline_panel(options, rows)
             self._views(self._history.study() or Study(study="default"))
             self._timer = ui.timer(UPDATE_S, self._tick, active=False)
             ui.on(SEEK, lambda event: self._seek(event.args))
@@ -134,8 +136,7 @@ class RecordingPage:
             testid(self._rate.props("dense outlined options-dense").style("min-width: 6rem"), "rate")
             self._position = text("", "", "position")
 
-    def _timeline_panel(self) -> None:
-        options = timeline_options(self._recording)
+    def _timeline_panel(self, options: dict[str, Any], rows: list[Row]) -> None:
         with ui.element("section").classes("panel timeline").props('aria-label="Time line"'):
             with ui.element("div").classes("bar"):
                 explain(text("Time line", tag="h2"), TIMELINE)
@@ -146,7 +147,7 @@ class RecordingPage:
         with ui.element("section").classes("panel").props('aria-label="Events"'):
             text("Events", tag="h2")
             table = DataTable("events", "Events of the session", ("time", "kind", "what"), scrolls=True)
-        ui.run_javascript(f"shift.timeline({self._chart.id}); {table.script(event_rows(events(self._recording)))}")
+        ui.run_javascript(f"shift.timeline({self._chart.id}); {table.script(rows)}")
 
     def _views(self, study: Study) -> None:
         self._room = RoomElements(study)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from itertools import pairwise
+from math import ceil
 from typing import Any, Literal, NamedTuple
 
 from shift_schemas.messages import Config, Decision, Override
@@ -212,9 +213,12 @@ def events(recording: RecordingHistory) -> list[Event]:
 
 
 def event_rows(found: list[Event]) -> list[Row]:
-    """Return the rows of the table: the position is a button that moves the cursor there."""
+    """Return the rows of the table: the position is a button that moves the cursor there.
+
+    Positions are rounded up to milliseconds, so that the event itself has happened at the cursor.
+    """
     return [
-        Row([Cell(button=Button(duration(at), SEEK, round(at, 3), f"Go to {at:.1f} s")), kind, what])
+        Row([Cell(button=Button(duration(at), SEEK, ceil(1000 * at) / 1000, f"Go to {at:.1f} s")), kind, what])
         for at, kind, what in found
     ]
 
