@@ -43,9 +43,12 @@ def test_page_opened_in_the_middle_of_a_session_shows_all_of_it(tab: Tab, shift:
         shift.decide("room2", "grasp")
     tab.go("/session/room2")
     tab.wait_text("decision-number", "3")
-    chart = tab.page.locator(".strip .nicegui-echart")
-    drawn = chart.evaluate("e => getElement(Number(e.id.slice(1))).chart.getOption().series[0].markLine.data.length")
-    assert drawn == 1 + 3, "the threshold and three decisions"
+    lines = "getElement(Number(e.id.slice(1))).chart.getOption().series[0].markLine.data.length"
+    three_decisions_and_the_threshold = 4
+    tab.page.wait_for_function(
+        f"n => {{ const e = document.querySelector('.strip .nicegui-echart'); return {lines} === n }}",
+        arg=three_decisions_and_the_threshold,
+    )
 
 
 def test_marker_override_and_end_are_kept(tab: Tab, shift: RestClient) -> None:
