@@ -212,3 +212,21 @@ def test_pauses_longer_than_the_longest_are_shortened_and_steps_back_left_out() 
     assert (line.shortened, line.left_out_ns) == (1, 365 * 86400 * NS - 10 * NS)
     unlimited = TimeLine(0.0)
     assert [unlimited.position_s(t * NS) for t in (0, 50)] == [0.0, 50.0]
+
+
+def test_pacer_goes_on_from_its_position_at_another_rate() -> None:
+    now = [0.0]
+
+    async def positions() -> tuple[float, float, float]:
+        pacer = Pacer(2.0, lambda: now[0])
+        now[0] = 3.0
+        pacer.change_rate(10.0)
+        at_change = pacer.position_s
+        now[0] = 4.0
+        later = pacer.position_s
+        pacer.toggle()
+        pacer.change_rate(1.0)
+        now[0] = 9.0
+        return at_change, later, pacer.position_s
+
+    assert asyncio.run(positions()) == (6.0, 16.0, 16.0)

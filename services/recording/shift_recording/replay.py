@@ -147,6 +147,11 @@ class Pacer:
         self._at, self._since = position_s, (None if self.paused else self._now())
         self._changed.set()
 
+    def change_rate(self, rate: float) -> None:
+        """Run at another rate from here on."""
+        self.seek(self.position_s)
+        self._rate = rate
+
     async def until(self, position_s: float) -> None:
         """Return when the position is reached."""
         while (left_s := position_s - self.position_s) > 0 or self.paused:

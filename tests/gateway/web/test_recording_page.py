@@ -1,98 +1,140 @@
-"""A recording in the browser: the time line, the views under the cursor, verify and download."""
+"""One recording in a browser, compared with what REST said while the session ran."""
 
 from __future__ import annotations
 
-import hashlib
+import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from shift_runtime.rest_client import RestClient
-from shift_schemas.messages import GazeChunk
-from support.browser import WAIT_MS, Tab
+from shift_schemas.messages import GazeChunk, Mark
+from support.browser import Tab
 from support.whole_mesh import LiveMesh
 
-SCRIPT_TEXT = "<img src=x onerror=\"document.title='interpreted'\">"
+SCRIPT_TEXT = "<img src=x onerror=document.title='interpreted'>"
+
+
+def looks(session: str, shift: RestClient, seq: int, aoi: str) -> None:
+    """Send one second of gaze at one AOI."""
+    t = [seq + i / 10 for i in range(10)]
+    shift.gaze(session, GazeChunk(source="glasses", seq=seq, t=t, aoi=[aoi] * 10))
 
 
 @pytest.fixture(scope="module")
-def recorded(mesh: LiveMesh) -> Path:
-    """Return the recording of a session with gaze, three decisions, a change and a marker."""
+def ended(mesh: LiveMesh) -> dict[str, Any]:
+    """A session that has ended: its two decisions, its observation after the first one, and its end."""
     with RestClient(mesh.url) as shift:
-        shift.start("P01", session="rec", study="coffee", seed=7, condition="adaptive")
-        for n in range(3):
-            t = [n + i / 10 for i in range(10)]
-            shift.gaze("rec", GazeChunk(source="glasses", seq=n, t=t, aoi=["cup"] * 10))
-            shift.decide("rec", "grasp", f"d{n + 1}")
-            shift.report("rec", f"d{n + 1}", True, 5.0, n > 0, 6.0)
-        shift._ask("PATCH", "/v1/sessions/rec/config", {"reward": {"scale": 0.5}})
-        shift._ask("POST", "/v1/sessions/rec/markers", {"text": SCRIPT_TEXT})
-        return mesh.data / "recordings" / shift.end("rec")["recording"]
+        shift.start("P01", session="rec1", study="coffee", seed=7)
+        looks("rec1", shift, 0, "cup")
+        first = shift.decide("rec1", "grasp")
+        shift.report("rec1", first["decision_id"], True, 5.0, True, 5.0)
+        shift.command(Mark, "rec1", text=SCRIPT_TEXT)
+        looks("rec1", shift, 1, "robot")
+        second = shift.decide("rec1", "turn")
+        result = shift.report("rec1", second["decision_id"], False, 9.0, True, 4.0)
+        observation = shift.observation("rec1")
+        shift.end("rec1")
+        return {"first": first, "second": second, "result": result, "observation": observation}
 
 
-def test_recording_shows_its_end_and_every_event(tab: Tab, recorded: Path) -> None:
-    tab.go("/recordings/rec.mcap")
-    tab.wait_text("decision-number", "3")
-    assert "participant P01" in (tab.page.locator("main").first.text_content() or "")
-    tab.wait_text("events", "reward.scale: 1.0 → 0.5")
-    tab.wait_text("events", SCRIPT_TEXT)
-    tab.wait_text("history", "d3")
-    assert tab.page.title() != "interpreted"
-    assert tab.find("timeline").locator("svg").count() == 1
+def seconds(decision: dict[str, Any], shift: RestClient) -> float:
+    """The position of a decision, seconds from the session's start."""
+    started, stamp = shift.session("rec1")["started"], decision["stamp"]
+    return float(stamp["sec"] - started["sec"] + (stamp["nsec"] - started["nsec"]) / 1e9)
 
 
-def test_views_follow_the_cursor_and_playing_moves_it(tab: Tab, recorded: Path) -> None:
-    tab.go("/recordings/rec.mcap")
-    tab.wait_text("decision-number", "3")
-    tab.fill("seek", "0")
-    tab.wait_text("decision-number", "0")
-    assert tab.text("strategy") == ""
-    tab.choose("rate", "0.5 ×")
+def test_end_of_the_recording_shows_what_rest_said(tab: Tab, ended: dict[str, Any]) -> None:
+    tab.go("/recordings/rec1.mcap")
+    tab.fill("seek", "100000")
+    tab.wait_text("decision-number", "2")
+    observation = ended["observation"]
+    assert tab.text("strategy") == ", ".join(ended["second"]["strategy"].values())
+    assert tab.text("cognitive-state") == ended["second"]["cognitive_state"]
+    tab.wait_text("capacity", f"{observation['capacity']['value']:.2f}")
+    assert tab.text("gaze-class") == observation["gaze"]["category"]
+    for aoi, weight in observation["gaze"]["weights"].items():
+        assert tab.text(f"weight-{aoi}") == f"{weight:.2f}"
+    assert tab.text("cumulative-reward") == f"{ended['result']['cumulative_reward']:.2f}"
+    assert tab.text("result-pending") == ""
+
+
+def test_cursor_shows_the_session_as_it_was_then(tab: Tab, shift: RestClient, ended: dict[str, Any]) -> None:
+    tab.go("/recordings/rec1.mcap")
+    tab.page.get_by_role("button", name=f"Go to {seconds(ended['first'], shift):.1f} s").first.click()
+    tab.page.wait_for_function("() => document.querySelectorAll('[data-testid=history] tbody tr').length === 1")
+    assert tab.text("decision-number") == "1"
+    assert tab.text("strategy") == ", ".join(ended["first"]["strategy"].values())
+
+
+def test_playing_reaches_the_end_and_pausing_stays(tab: Tab, ended: dict[str, Any]) -> None:
+    tab.go("/recordings/rec1.mcap")
+    tab.choose("rate", "0.25")
     tab.click("play")
-    tab.wait_text("decision-number", "3")
+    tab.page.wait_for_function("() => Number(document.querySelector('[data-testid=seek]').value) > 0")
     tab.click("pause")
+    tab.page.wait_for_timeout(600)
+    stood = tab.find("seek").input_value()
+    tab.page.wait_for_timeout(600)
+    assert tab.find("seek").input_value() == stood
+    tab.choose("rate", "30")
+    tab.click("play")
+    tab.wait_text("decision-number", "2")
 
 
-def test_verify_finds_no_difference_and_the_download_is_the_file(tab: Tab, recorded: Path) -> None:
-    tab.go("/recordings/rec.mcap")
+def test_events_and_time_line_tell_the_session(tab: Tab, ended: dict[str, Any]) -> None:
+    tab.go("/recordings/rec1.mcap")
+    tab.wait_text("events", SCRIPT_TEXT)
+    assert tab.page.title() != "interpreted"
+    assert tab.page.locator("[data-testid=events] tbody tr", has_text="decision").count() == 2
+    tab.page.locator("[data-testid=timeline] svg").first.wait_for()
+    with tab.page.expect_download() as saved:
+        tab.click("save-svg")
+    assert saved.value.suggested_filename == "rec1-timeline.svg"
+    assert Path(saved.value.path()).read_text().startswith("<svg")
+
+
+def test_verification_finds_no_difference_and_then_the_first_one(
+    tab: Tab, shift: RestClient, ended: dict[str, Any], mesh: LiveMesh
+) -> None:
+    tab.go("/recordings/rec1.mcap")
     tab.click("verify")
     tab.wait_text("verify-result", "no difference")
-    tab.page.get_by_text("The checksum matches.").wait_for(timeout=WAIT_MS)
-    with tab.page.expect_download() as download:
+    checksum = mesh.data / "recordings" / "rec1.mcap.sha256"
+    good = checksum.read_text()
+    checksum.write_text("0" * 64 + "  rec1.mcap\n")
+    try:
+        tab.click("verify")
+        tab.wait_text("verify-result", "its SHA-256 should be 0000")
+    finally:
+        checksum.write_text(good)
+
+
+def test_download_is_the_file(tab: Tab, ended: dict[str, Any], mesh: LiveMesh) -> None:
+    tab.go("/recordings/rec1.mcap")
+    with tab.page.expect_download() as loaded:
         tab.click("download")
-    found = Path(str(download.value.path())).read_bytes()
-    assert hashlib.sha256(found).hexdigest() == hashlib.sha256(recorded.read_bytes()).hexdigest()
+    assert Path(loaded.value.path()).read_bytes() == (mesh.data / "recordings" / "rec1.mcap").read_bytes()
 
 
-def test_time_line_is_saved_as_svg(tab: Tab, recorded: Path) -> None:
-    tab.go("/recordings/rec.mcap")
-    tab.wait_text("decision-number", "3")
-    with tab.page.expect_download() as download:
-        tab.page.get_by_role("button", name="Save as SVG").click()
-    assert download.value.suggested_filename == "rec-time-line.svg"
-    assert Path(str(download.value.path())).read_text().startswith("<svg")
-
-
-def test_changed_recording_is_shown_and_its_first_difference_named(tab: Tab, mesh: LiveMesh, recorded: Path) -> None:
-    data = bytearray(recorded.read_bytes())
-    (mesh.data / "recordings" / "cut.mcap").write_bytes(data[: len(data) // 2])
+@pytest.mark.parametrize(("kept", "says"), [(0.6, "it was not finished"), (0, "not the beginning")])
+def test_damaged_recording_says_why(tab: Tab, ended: dict[str, Any], mesh: LiveMesh, kept: float, says: str) -> None:
+    whole = (mesh.data / "recordings" / "rec1.mcap").read_bytes()
+    data = whole[: int(kept * len(whole))] or b"something else"
+    (mesh.data / "recordings" / "cut.mcap").write_bytes(data)
     tab.go("/recordings/cut.mcap")
-    tab.page.get_by_text("Not complete").wait_for(timeout=WAIT_MS)
-    tab.click("verify")
-    tab.page.wait_for_function(
-        "() => document.querySelector('[data-testid=verify-result]').textContent.length > 0", timeout=WAIT_MS
-    )
-    assert tab.text("verify-result") != "no difference"
+    tab.wait_text("recording-reason", says)
 
 
 def test_unknown_recording_is_named(tab: Tab) -> None:
     tab.go("/recordings/nobody.mcap")
-    tab.page.get_by_text("there is no recording nobody.mcap").wait_for(timeout=WAIT_MS)
+    tab.page.get_by_text("There is no recording nobody.mcap").wait_for()
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
-def test_recording_has_no_serious_finding_of_axe(open_tab, recorded: Path, dark: bool) -> None:
+def test_recording_has_no_serious_finding_of_axe(open_tab, ended: dict[str, Any], dark: bool) -> None:
     with open_tab(dark=dark) as tab:
-        tab.go("/recordings/rec.mcap")
-        tab.wait_text("decision-number", "3")
-        tab.page.locator(".q-table__middle[tabindex]").first.wait_for()
-        assert tab.serious_findings() == []
+        tab.go("/recordings/rec1.mcap")
+        tab.wait_text("events", "the session is ended")
+        tab.page.wait_for_timeout(500)
+        assert json.dumps(tab.serious_findings()) == "[]"

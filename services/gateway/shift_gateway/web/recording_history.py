@@ -48,6 +48,8 @@ class RecordingHistory:
     history: SessionHistory = field(default_factory=lambda: SessionHistory(live=False))
     reason: str = ""
     """Why the recording is not complete, or how it is damaged."""
+    _first: tuple[int, int] = (-1, 0)
+    """The history's revision, and the beginning of its time line: every position is measured from it."""
 
     def add(self, part: SeriesPart | FileEnd) -> None:
         """Add what the process sent."""
@@ -62,9 +64,9 @@ class RecordingHistory:
     @property
     def first_ns(self) -> int:
         """The beginning of the time line: the session's start, or the first message if the start is missing."""
-        session = self.history.session(0)
-        firsts = [s.times[0] for s in series_of(self.history).values() if len(s)]
-        return session.started.ns if session else min(firsts, default=0)
+        if self._first[0] != self.history.revision:
+            self._first = (self.history.revision, _first_ns(self.history))
+        return self._first[1]
 
     @property
     def length_s(self) -> float:
@@ -79,6 +81,12 @@ class RecordingHistory:
     def position_s(self, ns: int) -> float:
         """Return the position of a time, seconds."""
         return max(ns - self.first_ns, 0) / NS
+
+
+def _first_ns(history: SessionHistory) -> int:
+    session = history.session(0)
+    firsts = [series.times[0] for series in series_of(history).values() if len(series)]
+    return session.started.ns if session else min(firsts, default=0)
 
 
 def series_of(history: SessionHistory) -> dict[str, Series[Any]]:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 from itertools import pairwise
+from math import ceil
 from typing import Any, Literal, NamedTuple
 
-from shift_schemas.messages import Config, Decision
+from shift_schemas.messages import Config, Decision, Override
 
-from shift_gateway.web.change_list import differences, word
 from shift_gateway.web.charts import gaps, shortened
 from shift_gateway.web.history import END_OF_TIME, SessionHistory
 from shift_gateway.web.recording_history import RecordingHistory
 from shift_gateway.web.recording_summary import is_blinded
 from shift_gateway.web.recordings_view import BLINDED
+from shift_gateway.web.table_rows import Button, Cell, Row
 from shift_gateway.web.wording import date_and_time, duration, levels, origin
 
 MOST_POINTS = 3000
@@ -21,8 +22,10 @@ MOST_POINTS = 3000
 LINKED = 4
 """The number of charts that share the time axis."""
 TIME_AXIS = {"type": "value", "axisLabel": {":formatter": "shift.position"}, "axisTick": {"show": False}}
-NEUTRAL, CURSOR = "rgba(125,135,145,.35)", "#d1495b"
+NEUTRAL, CURSOR, FIRST, SECOND = "rgba(125,135,145,.35)", "#d1495b", "#1a85c4", "#d55e00"
 """Colours that are seen on light and on dark ground."""
+SEEK = "recording-seek"
+"""The browser's event for a position that was chosen in the time line or in the table, seconds."""
 EventKind = Literal["session", "decision", "result", "override", "marker", "change", "gap"]
 
 
@@ -95,7 +98,7 @@ def timeline_options(recording: RecordingHistory) -> dict[str, Any]:
             *_curves(recording), _markers(recording),
             _steps("state", 1, [[s, d.cognitive_state] for s, d in decisions], length),
             _steps("strategy", 2, [[s, levels(d.strategy)] for s, d in decisions], length),
-            *_rewards(recording), *_cursors(),
+            *_rewards(recording), _cursor(),
         ],
     }  # fmt: skip
 
@@ -141,30 +144,28 @@ def _steps(name: str, axis: int, data: list[list[Any]], length: float) -> dict[s
     """Return a line that stays at each value until the next one. The last value lasts until the end."""
     return {
         "name": name, "type": "line", "step": "end", "xAxisIndex": axis, "yAxisIndex": axis, "symbolSize": 7,
-        "symbol": "circle", "showSymbol": len(data) <= 200, "lineStyle": {"width": 2},
+        "symbol": "circle", "color": FIRST, "showSymbol": len(data) <= 200, "lineStyle": {"width": 2},
         "data": [*data, {"value": [length, data[-1][1]], "symbol": "none"}] if data else [],
     }  # fmt: skip
 
 
 def _rewards(recording: RecordingHistory) -> list[dict[str, Any]]:
     results = [(recording.position_s(ns), p) for ns, p in _entries(recording.history, "performances")]
+    axes = {"xAxisIndex": 3, "color": SECOND}
+    sums = [[s, round(p.cumulative_reward, 4)] for s, p in results]
     return [
-        {"name": "reward", "type": "bar", "barWidth": 4, "xAxisIndex": 3, "yAxisIndex": 3,
-         "data": [[s, round(p.reward, 4)] for s, p in results]},
-        {"name": "cumulative reward", "type": "line", "step": "end", "showSymbol": False, "xAxisIndex": 3,
-         "yAxisIndex": 4, "lineStyle": {"width": 2}, "data": [[s, round(p.cumulative_reward, 4)] for s, p in results]},
+        {"name": "reward", "type": "scatter", "symbol": "diamond", "symbolSize": 10, "yAxisIndex": 3,
+         "data": [[s, round(p.reward, 4)] for s, p in results], **axes},
+        {"name": "cumulative reward", "type": "line", "step": "end", "showSymbol": False, "yAxisIndex": 4,
+         "lineStyle": {"width": 2}, "data": sums, **axes, "color": FIRST},
     ]  # fmt: skip
 
 
-def _cursors() -> list[dict[str, Any]]:
-    """Return a line without points for each chart, which carries the cursor."""
+def _cursor() -> dict[str, Any]:
+    """Return a line without points that carries the cursor, which the browser moves (``shift.cursor``)."""
     style = {"color": CURSOR, "width": 2, "type": "solid"}
     mark = {"silent": True, "symbol": "none", "animation": False, "label": {"show": False}, "lineStyle": style}
-    return [
-        {"id": f"cursor{i}", "type": "line", "xAxisIndex": i, "yAxisIndex": i, "data": [],
-         "markLine": {**mark, "data": [{"xAxis": 0}]}}
-        for i in range(LINKED)
-    ]  # fmt: skip
+    return {"id": "cursor", "type": "line", "data": [], "markLine": {**mark, "data": []}}
 
 
 def thinned(points: list[tuple[float, float]], most: int = MOST_POINTS) -> list[list[float]]:
@@ -201,8 +202,9 @@ def events(recording: RecordingHistory) -> list[Event]:
     add("sessions", "session", lambda s: f"the session is {s.state}")
     add("decisions", "decision", _decision_text)
     add("performances", "result", _result_text)
-    add("overrides", "override", lambda o: f"next {o.task}: {levels(o.strategy) or 'no override'} {o.reason}".strip())
-    add("markers", "marker", lambda m: m.text)
+    add("overrides", "override", _override_text)
+    retracted = {m.retracts for m in history.markers.items if m.retracts}
+    add("markers", "marker", lambda m: m.text + (" (retracted later)" if m.marker_id in retracted else ""))
     found += [
         Event(recording.position_s(ns), "change", f"configuration {after.version}: {changed_keys(before, after)}")
         for (_, before), (ns, after) in pairwise(_entries(history, "configs"))
@@ -210,19 +212,38 @@ def events(recording: RecordingHistory) -> list[Event]:
     return sorted(found, key=lambda event: event.position_s)
 
 
-def changed_keys(before: Config, after: Config) -> str:
-    """Return what a configuration changed, such as ``learner.epsilon: 0.75 → 0.2``."""
-    found = differences(json.loads(before.study), json.loads(after.study))
-    lines = [
-        f"{'.'.join(path)}: {shortened(word(old), 60)} → {shortened(word(new), 60)}"
-        for path, (old, new) in found.items()
+def event_rows(found: list[Event]) -> list[Row]:
+    """Return the rows of the table: the position is a button that moves the cursor there.
+
+    Positions are rounded up to milliseconds, so that the event itself has happened at the cursor.
+    """
+    return [
+        Row([Cell(button=Button(duration(at), SEEK, ceil(1000 * at) / 1000, f"Go to {at:.1f} s")), kind, what])
+        for at, kind, what in found
     ]
-    return "; ".join(lines) or "nothing changed"
+
+
+def changed_keys(before: Config, after: Config) -> str:
+    """Return what a configuration changed, such as ``learner.epsilon 0.75 → 0.2``."""
+    return "; ".join(_changed(json.loads(before.study), json.loads(after.study), "")) or "nothing changed"
+
+
+def _changed(before: Any, after: Any, at: str) -> list[str]:
+    if isinstance(before, dict) and isinstance(after, dict):
+        keys = dict.fromkeys([*before, *after])
+        inner = [_changed(before.get(k), after.get(k), f"{at}.{k}" if at else str(k)) for k in keys]
+        return [line for lines in inner for line in lines]
+    return [] if before == after else [f"{at} {shortened(str(before), 60)} → {shortened(str(after), 60)}"]
 
 
 def _decision_text(decision: Decision) -> str:
     where = f"{decision.n}, {decision.task}: {levels(decision.strategy)} in {decision.cognitive_state}"
     return f"{where} ({origin(decision)})"
+
+
+def _override_text(override: Override) -> str:
+    what = f"withdraws the override of {override.task}" if override.withdraws else f"next {override.task}: "
+    return ", ".join(part for part in (what + levels(override.strategy), override.reason, override.author) if part)
 
 
 def _result_text(result: Any) -> str:

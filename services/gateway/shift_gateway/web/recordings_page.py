@@ -123,7 +123,7 @@ class RecordingsPage:
             async for found, total in summaries.of(self._folder):
                 self._summaries = found
                 missing = [s.name for s in found if s.name not in self._exclusions]
-                self._exclusions |= await asyncio.to_thread(_exclusions, self._folder, missing)
+                self._exclusions |= await asyncio.to_thread(exclusions_of, self._folder, missing)
                 self._progress.value = len(found) / total if total else 1
                 self._progress.set_visibility(len(found) < total)
                 self._progress_text.text = f"{len(found)} of {total} recordings are read."
@@ -161,8 +161,8 @@ class ExclusionDialog:
         with ui.dialog() as self._dialog, ui.card():
             self._title = text("", tag="h2")
             text("The recording does not change. The reason is kept beside it, with your name and the time.", "muted")
-            self._reason = testid(ui.input("Reason"), "exclusion-reason").classes("wide")
-            self._author = testid(ui.input("Your name or initials"), "exclusion-author").classes("wide")
+            self._reason = testid(ui.input("Reason"), "exclusion-reason").classes("dialog-field")
+            self._author = testid(ui.input("Your name or initials"), "exclusion-author").classes("dialog-field")
             with ui.row():
                 self._button = testid(ui.button("Exclude", on_click=self._write).props("outline"), "exclusion-confirm")
                 ui.button("Cancel", on_click=self._dialog.close).props("flat")
@@ -197,7 +197,7 @@ class ExclusionDialog:
         self._dialog.close()
 
 
-def _exclusions(folder: Path, names: list[str]) -> dict[str, Exclusion | str]:
+def exclusions_of(folder: Path, names: list[str]) -> dict[str, Exclusion | str]:
     """Return the exclusion of each recording; a text if its file cannot be read."""
     found: dict[str, Exclusion | str] = {}
     for name in names:

@@ -11,7 +11,7 @@ class Button(NamedTuple):
 
     text: str
     event: str
-    value: str | int
+    value: str | float
     label: str
     """What a screen reader says, since the text alone does not name the row."""
     name: str = ""

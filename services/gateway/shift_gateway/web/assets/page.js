@@ -11,8 +11,8 @@
   const strips = {};
   const chartOf = (id) => { const e = getElement(id); return e && e.chart; };
 
-  const themed = (chart) => {
-    const c = colours(), options = chart.getOption();
+  const themed = (chart, c = colours()) => {
+    const options = chart.getOption();
     const axes = (list) => (list || []).map(() => ({
       axisLabel: { color: c.text }, axisLine: { lineStyle: { color: c.line } },
       splitLine: { lineStyle: { color: c.line } }, nameTextStyle: { color: c.text } }));
@@ -25,7 +25,7 @@
   };
   const allCharts = () => [...document.querySelectorAll('.nicegui-echart')].map((e) => {
     const id = Number(e.id.slice(1)); return chartOf(id); }).filter(Boolean);
-  const retheme = () => allCharts().forEach(themed);
+  const retheme = () => allCharts().forEach((chart) => themed(chart));
 
   const drawStrip = (id, nowMs) => {
     const s = strips[id], chart = chartOf(id);
@@ -182,6 +182,42 @@
     theme(next) {
       if (next) localStorage.setItem('shift-theme', next);
       return localStorage.getItem('shift-theme') || 'auto';
+    },
+    position(seconds) {
+      const whole = Math.floor(seconds), two = (n) => String(n).padStart(2, '0');
+      const hours = Math.floor(whole / 3600), minutes = Math.floor(whole / 60) % 60;
+      return hours ? `${hours}:${two(minutes)}:${two(whole % 60)}` : `${minutes}:${two(whole % 60)}`;
+    },
+    timeline(id) {
+      later(id, () => chartOf(id), (chart) => {
+        themed(chart);
+        chart.getZr().on('click', (event) => {
+          const point = [event.offsetX, event.offsetY];
+          const grid = [0, 1, 2, 3].find((i) => chart.containPixel({ gridIndex: i }, point));
+          if (grid !== undefined) emitEvent('recording-seek', chart.convertFromPixel({ gridIndex: grid }, point)[0]);
+        });
+      });
+    },
+    cursor(id, seconds) { // one line through all charts of the time line
+      const chart = chartOf(id);
+      if (!chart) return;
+      const grids = chart.getOption().grid, last = grids[grids.length - 1];
+      chart.setOption({ series: [{ id: 'cursor', markLine: { data: seconds === null ? [] : [
+        [{ xAxis: seconds, y: grids[0].top }, { xAxis: seconds, y: last.top + last.height }]] } }] });
+    },
+    saveSvg(id, name, seconds) { // in light colours, which print, and without the cursor
+      const chart = chartOf(id);
+      if (!chart) return;
+      themed(chart, COLOURS.light);
+      chart.setOption({ backgroundColor: '#ffffff' });
+      shift.cursor(id, null);
+      const link = document.createElement('a');
+      link.href = chart.getDataURL({ type: 'svg', excludeComponents: ['dataZoom'] });
+      link.download = name;
+      link.click();
+      chart.setOption({ backgroundColor: 'transparent' });
+      themed(chart);
+      shift.cursor(id, seconds);
     },
     shortcuts(on) {
       if (on !== undefined) localStorage.setItem('shift-shortcuts', on ? 'on' : 'off');
