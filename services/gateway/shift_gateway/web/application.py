@@ -27,7 +27,7 @@ from shift_gateway.web.start_page import add_start_page
 from shift_gateway.web.study_page import add_study_page
 
 ASSETS = Path(__file__).parent / "assets"
-RECONNECT_S = 10.0
+RECONNECT_S = 20.0
 """How long the state of a page is kept while its browser has no connection, seconds; chosen: longer than a restart."""
 
 
