@@ -55,6 +55,17 @@ async def test_history_opened_in_the_middle_of_a_session_has_all_of_it(own_mesh:
         assert len({o.payload for o in history.observations.until()}) == len(history.observations)
 
 
+async def test_session_that_ended_before_the_gateway_started_has_all_of_it(own_mesh: Mesh) -> None:
+    session = await own_mesh.session(STUDY)
+    ids = await interactions(session, 2)
+    await session.end()
+    async with following(own_mesh) as (_, histories):
+        history = await histories.open(session.name)
+        assert [d.decision_id for d in history.decisions.until()] == ids
+        assert len(history.performances) == 2
+        assert history.observation() is not None
+
+
 async def test_nothing_is_kept_once_the_last_page_is_closed(own_mesh: Mesh) -> None:
     async with following(own_mesh) as (gateway, histories):
         session = await own_mesh.session(STUDY)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from shift_gateway.web.table_rows import Button, Cell, Heading, Row, heading_data, row_data
+import json
+
+from shift_gateway.web.table_rows import Button, Cell, Heading, Row, heading_data, row_data, rows_json
 
 
 def test_defaults_are_left_out() -> None:
@@ -26,3 +28,8 @@ def test_button_has_its_event_and_label() -> None:
 
 def test_headings_have_text_and_explanation() -> None:
     assert heading_data(["n", Heading("score", "why")]) == [["n", ""], ["score", "why"]]
+
+
+def test_json_of_rows_is_their_data() -> None:
+    rows = [Row(["“grasp”", Cell("0.50", bar=0.5)]), Row(["<b>", Cell()], name="r"), Row(["<b>", Cell()], name="r")]
+    assert json.loads(rows_json(rows)) == row_data(rows)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from nicegui import ui
 
 from shift_gateway.web.layout import testid
-from shift_gateway.web.table_rows import Heading, Row, heading_data, row_data
+from shift_gateway.web.table_rows import Heading, Row, heading_data, rows_json
 
 
 class DataTable:
@@ -34,7 +34,7 @@ class DataTable:
     def script(self, rows: Iterable[Row], headings: Sequence[Heading | str] | None = None) -> str:
         """Return the JavaScript that shows the rows; empty if they are shown already."""
         columns = self._headings if headings is None else headings
-        data = json.dumps([heading_data(columns), row_data(rows)], ensure_ascii=True)
+        data = f"[{json.dumps(heading_data(columns))},{rows_json(rows)}]"
         if data == self._shown:
             return ""
         self._shown = data

@@ -13,6 +13,7 @@ from shift_gateway.web.data_table import DataTable
 from shift_gateway.web.desk_charts import probability_options, probability_update, reward_options, reward_update
 from shift_gateway.web.desk_view import (
     DeskNumbers,
+    RowCache,
     awareness_rows,
     decision_rows,
     desk_numbers,
@@ -73,6 +74,7 @@ class DeskElements:
         self._history = history
         self.selected: int | None = None
         self._key: tuple[Any, ...] = ()
+        self._rows: RowCache = {}
         self._numbers = DeskNumbers()
         self._texts: dict[str, ui.label] = {}
         self._numbers_panel()
@@ -172,7 +174,7 @@ class DeskElements:
         return (
             self._scores.script(score_rows(parts_of(self._history, decision)))
             + self._probabilities.script(probability_rows(decision))
-            + self._decisions.script(decision_rows(self._history, n, at_ns))
+            + self._decisions.script(decision_rows(self._history, n, at_ns, self._rows))
             + (_chart_script(self._probability_chart, bars) if bars else "")
         )
 

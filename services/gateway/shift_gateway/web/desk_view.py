@@ -80,12 +80,24 @@ def reports_in_force(history: SessionHistory, at_ns: int = END_OF_TIME) -> dict[
     return {p.decision_id: p for p in history.performances.until(at_ns)}
 
 
-def decision_rows(history: SessionHistory, selected: int | None, at_ns: int = END_OF_TIME) -> list[Row]:
-    """Return a row for each decision, the newest first."""
+RowCache = dict[tuple[int, int, bool], Row]
+"""Rows by number of the decision, number of its report (0: none), and whether it is selected."""
+
+
+def decision_rows(
+    history: SessionHistory, selected: int | None, at_ns: int = END_OF_TIME, known: RowCache | None = None
+) -> list[Row]:
+    """Return a row for each decision, the newest first; rows in ``known`` are not made again."""
     reports = reports_in_force(history, at_ns)
-    return [
-        _decision_row(d, reports.get(d.decision_id), d.n == selected) for d in reversed(history.decisions.until(at_ns))
-    ]
+    cache: RowCache = {} if known is None else known
+    rows = []
+    for decision in reversed(history.decisions.until(at_ns)):
+        report = reports.get(decision.decision_id)
+        key = (decision.n, report.n if report else 0, decision.n == selected)
+        if key not in cache:
+            cache[key] = _decision_row(decision, report, decision.n == selected)
+        rows.append(cache[key])
+    return rows
 
 
 def _decision_row(decision: Decision, report: Performance | None, selected: bool) -> Row:

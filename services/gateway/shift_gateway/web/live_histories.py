@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from shift_runtime.read_model import SessionView
 from shift_runtime.reader import fact_of
+from shift_schemas.errors import Unavailable
+from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Fact, Observation, OutboxQuery
 from shift_schemas.registry import OWNERS
 
@@ -81,6 +83,7 @@ class LiveHistories:
 
     async def _load(self, session: str, view: SessionView, followed: _Followed) -> None:
         """Read what the read model has read already, and then apply what came meanwhile."""
+        await self._read_model_has_ended_session(session, view)
         cursors = {owner: self._gateway.read_model.reader.cursors.get((session, owner), 0) for owner in OWNERS}
         view.listeners.append(followed.on_fact)
         for owner, cursor in cursors.items():
@@ -88,6 +91,13 @@ class LiveHistories:
         waiting, followed.waiting = followed.waiting or [], None
         for fact in waiting:
             followed.history.apply(fact)
+
+    async def _read_model_has_ended_session(self, session: str, view: SessionView) -> None:
+        """Have the read model read a session that ended before this gateway started: it does so only when asked."""
+        reader = self._gateway.read_model.reader
+        unread = [owner for owner in OWNERS if (session, owner) not in reader.cursors]
+        if has_ended(view.fact.state) and unread and (silent := await reader.pull_all(unread, session)):
+            raise Unavailable(f"the {silent[0]} does not answer")
 
     async def _read(self, session: str, owner: str, last: int, history: SessionHistory) -> None:
         first = max(0, last - TAIL.get(owner, last))

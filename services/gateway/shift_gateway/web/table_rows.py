@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 
@@ -56,10 +58,21 @@ def heading_data(headings: Iterable[Heading | str]) -> list[list[str]]:
 
 def row_data(rows: Iterable[Row]) -> list[dict[str, Any]]:
     """Return the rows as JSON data, without what is left at its default."""
-    return [
-        {"cells": [_cell_data(c) for c in row.cells], **_given({"name": row.name, "classes": row.classes})}
-        for row in rows
-    ]
+    return [_row_data(row) for row in rows]
+
+
+def rows_json(rows: Iterable[Row]) -> str:
+    """Return the rows as a JSON list; a row that was encoded before is not encoded again."""
+    return f"[{','.join(_row_json(row._replace(cells=tuple(row.cells))) for row in rows)}]"
+
+
+@lru_cache(maxsize=4096)
+def _row_json(row: Row) -> str:
+    return json.dumps(_row_data(row))
+
+
+def _row_data(row: Row) -> dict[str, Any]:
+    return {"cells": [_cell_data(c) for c in row.cells], **_given({"name": row.name, "classes": row.classes})}
 
 
 def _cell_data(cell: Cell | str) -> str | dict[str, Any]:
