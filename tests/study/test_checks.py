@@ -109,7 +109,7 @@ def test_a_parameter_that_one_condition_s_learner_reads_has_an_effect() -> None:
 
 
 def test_every_parameter_belongs_to_a_learner() -> None:
-    assert set(LEARNER_SETTINGS) == set(LearnerName.__args__)
+    assert set(LEARNER_SETTINGS) <= set(LearnerName.__args__), "a learner without parameters needs no entry"
     assert frozenset().union(*(parameters_of(name) for name in LEARNER_SETTINGS)) == set(
         LearnerSettings.model_fields
     ) - {"name", "paused"}

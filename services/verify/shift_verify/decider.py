@@ -156,7 +156,8 @@ class DeciderFold(DeciderDerivation):
         fact = target.fact
         if isinstance(fact, Override):
             return override_command(fact)
-        assert isinstance(fact, Decision)
+        if not isinstance(fact, Decision):
+            differ(target, "", fact.subject, None, f"verify does not know how the decider makes a {fact.subject}")
         if fact.required is None:
             differ(target, "required", None, Seen().model_dump(mode="json"), "it does not record what it required")
         limits = {"decision": self.outputs.decisions}

@@ -70,7 +70,7 @@ class GuardedFold:
         except NotRecorded as e:
             self._reasons.append(str(e))
         except FAILURES as e:
-            why = f"the {self._owner}'s core cannot go on with what is recorded: {shorten(str(e))}"
+            why = f"the {self._owner}'s core cannot go on with what is recorded: {shorten(str(e) or type(e).__name__)}"
             self._add(Differs(LAST, Difference(self._owner, 0, "", None, None, why)))
 
     def _add(self, difference: Differs) -> None:

@@ -11,6 +11,7 @@ from shift_learner.learners import LEARNERS, learner_named
 from shift_learner.learners.tabular import Memory, Tabular, greedy
 from shift_model.vocabulary import LearnerName
 from shift_schemas.errors import InvalidStudy
+from shift_study.learner_settings import parameters_of
 from shift_study.study import Study
 from support.learner_histories import after_history, all_rows, context
 
@@ -50,7 +51,7 @@ def test_functions_of_a_learner_do_not_change_the_old_memory(name: str) -> None:
     assert json.dumps(learner.dump(memory)) == before
 
 
-@pytest.mark.parametrize("name", [n for n in NAMES if n not in ("scoring", "q-learning")])
+@pytest.mark.parametrize("name", [n for n in NAMES if "scoring_prior" in parameters_of(n) and n != "q-learning"])
 def test_suggestion_is_the_most_probable_action_at_first_with_the_prior(name: str) -> None:
     where, learner = context(name), LEARNERS[name]
     for triple in range(15, 30):
