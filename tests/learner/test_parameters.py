@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from shift_learner.learner import Context, Taken
+from shift_learner.learner import Context, DecisionView
 from shift_learner.learners import LEARNERS, planner
 from shift_learner.learners.planning.engine import model_of
 from shift_study.learner_settings import LearnerSettings, parameters_of
@@ -35,7 +35,7 @@ def test_learner_reads_exactly_the_parameters_that_are_listed_for_it(
     monkeypatch.setattr(planner, "_model_of", lambda study: model_of(context))  # it reads the study's text otherwise
     learner = LEARNERS[name]
     memory = learner.initial(context)
-    taken = [Taken(t + 1, t, context.suggestions[t], action=1, propensity=0.5) for t in range(6)]
+    taken = [DecisionView(t + 1, t, context.suggestions[t], action=1, propensity=0.5) for t in range(6)]
     for one, following in pairwise(taken):
         learner.row(context, memory, one.triple if learner.on_triples else one.cognitive_state)
         learner.epsilon(context, memory)

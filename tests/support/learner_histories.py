@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from shift_learner.learner import Context, Learner, Row, Taken, state_names
+from shift_learner.learner import Context, DecisionView, Learner, Row, state_names
 from shift_study.study import Study
 
 
@@ -21,7 +21,7 @@ def after_history(learner: Learner, where: Context, interactions: int) -> tuple[
     for n in range(1, interactions + 1):
         triple, action = int(rng.integers(30)), int(rng.integers(where.actions))
         reward = float(rng.choice([-1, 1]) * rng.uniform(0.4, 0.7))
-        taken = Taken(n, triple, where.suggestions[triple], action, 1.0)
+        taken = DecisionView(n, triple, where.suggestions[triple], action, 1.0)
         memory = learner.on_decision(where, memory, taken)
         memory = learner.on_reward(where, memory, taken, reward, None)
         seen.append((triple, action, reward))

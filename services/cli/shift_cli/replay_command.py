@@ -54,21 +54,27 @@ def replay(
     import asyncio
 
     from shift_recording.replay import Replay, extent_of, replay_session
-    from shift_schemas.errors import Conflict
 
     extent = extent_of(file, longest_pause)
     wanted = tuple(name.strip() for name in topics.split(",") if name.strip()) or SUBJECTS
     plan = Replay(file, session or replay_session(extent.session), speed, start_offset, wanted, loop, longest_pause)
+    _check_plan(plan, extent)
+    published = asyncio.run(_run(plan, extent, zenoh, start_paused))
+    typer.echo(f"{published} messages replayed under session {plan.session}", err=True)
+
+
+def _check_plan(plan: Replay, extent: Extent) -> None:
+    """Refuse the recorded session's own name, and say how much the shortened pauses leave out."""
+    from shift_schemas.errors import Conflict
+
     if plan.session == extent.session:
         raise Conflict(f"{plan.session} is the recorded session itself; a replay needs another name")
     if extent.shortened:
         typer.echo(
-            f"{extent.shortened} pauses are shortened to {longest_pause:g} s each, which leaves out "
+            f"{extent.shortened} pauses are shortened to {plan.longest_pause_s:g} s each, which leaves out "
             f"{extent.left_out_s:.0f} s (--longest-pause 0 keeps them)",
             err=True,
         )
-    published = asyncio.run(_run(plan, extent, zenoh, start_paused))
-    typer.echo(f"{published} messages replayed under session {plan.session}", err=True)
 
 
 async def _run(plan: Replay, extent: Extent, zenoh: str, start_paused: bool) -> int:

@@ -28,7 +28,7 @@ from shift_schemas.messages import (
 )
 from shift_schemas.timestamps import Stamp
 
-from shift_learner.learner import Context, Taken, state_names, state_of
+from shift_learner.learner import Context, DecisionView, state_names, state_of
 from shift_learner.reports import CORRECTABLE, check_known, performance_of, repeats, with_report, without_report
 from shift_learner.state import LearnerState, OpenDecision, Reported, context_of, dump, load
 
@@ -95,9 +95,9 @@ def _on_decision(state: LearnerState, decision: Decision, now: Stamp) -> Step[Le
     return _with_policy(after, facts, now)
 
 
-def _taken(context: Context, decision: Decision) -> Taken:
+def _taken(context: Context, decision: Decision) -> DecisionView:
     seen = decision.observation
-    return Taken(
+    return DecisionView(
         n=decision.n,
         triple=Triple(seen.capacity, seen.gaze, seen.awareness).number,
         cognitive_state=context.cognitive_states.index(decision.cognitive_state),

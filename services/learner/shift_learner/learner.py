@@ -38,7 +38,7 @@ class Context:
         return self.study.scoring.states
 
 
-class Taken(NamedTuple):
+class DecisionView(NamedTuple):
     """A decision as a learner sees it."""
 
     n: int
@@ -71,10 +71,12 @@ class Learner(Protocol):
     def initial(self, context: Context) -> Any:
         """Return the memory before the first decision."""
 
-    def on_decision(self, context: Context, memory: Any, taken: Taken) -> Any:
+    def on_decision(self, context: Context, memory: Any, taken: DecisionView) -> Any:
         """Return the memory after a decision, before its reward is known."""
 
-    def on_reward(self, context: Context, memory: Any, taken: Taken, reward: float, following: Taken | None) -> Any:
+    def on_reward(
+        self, context: Context, memory: Any, taken: DecisionView, reward: float, following: DecisionView | None
+    ) -> Any:
         """Return the memory after the reward of ``taken``.
 
         ``following`` is the next decision; it is given only if :meth:`needs_following` returns True.
@@ -101,6 +103,6 @@ def state_names(learner: Learner, context: Context) -> Sequence[str]:
     return [t.name for t in TRIPLES] if learner.on_triples else context.cognitive_states
 
 
-def state_of(learner: Learner, taken: Taken) -> int:
+def state_of(learner: Learner, taken: DecisionView) -> int:
     """Return the index of the learner's state in which a decision was made."""
     return taken.triple if learner.on_triples else taken.cognitive_state

@@ -12,7 +12,7 @@ from shift_schemas.lifecycle import LIVE
 from shift_schemas.messages import Config, Performance, Seen, SessionState, Versions
 from shift_study.loading import study_from_json
 
-from shift_learner.learner import Context, Learner, Taken
+from shift_learner.learner import Context, DecisionView, Learner
 from shift_learner.learners import learner_named
 
 
@@ -21,9 +21,9 @@ class OpenDecision:
     """A decision without a report, or one that was reported and not learned from yet."""
 
     task: str
-    taken: Taken
+    taken: DecisionView
     versions: Versions
-    following: Taken | None = None
+    following: DecisionView | None = None
     """The decision after it, once there is one."""
 
 
@@ -52,7 +52,7 @@ class LearnerState:
     """The number of reports of each task, without corrections."""
     format: int = 1
     """The format of the session's recording (``shift_schemas.messages.FORMAT``)."""
-    last: Taken | None = None
+    last: DecisionView | None = None
     decisions: int = 0
     performances: int = 0
     cumulative_reward: float = 0.0

@@ -19,7 +19,7 @@ from shift_monitor.attention import initial_attention
 from shift_monitor.awareness import History, add_result, correct_result
 from shift_monitor.capacity import Capacity, apply_strategy
 from shift_monitor.gaze_columns import gaze_chunk_of
-from shift_monitor.gaze_input import GazeInput
+from shift_monitor.gaze_input import ChunkWithHistory
 from shift_monitor.gaze_step import close_stream, step_gaze
 from shift_monitor.prepared_study import prepare_study
 from shift_monitor.published import fixation_fact, observation_of, publish
@@ -62,10 +62,10 @@ def step(state: MonitorState | None, event: object, now: Stamp, timed_out: bool 
             return publish(_on_decision(state, event, timed_out), now)
         case Performance():
             return publish(_on_performance(state, event, timed_out), now)
-        case GazeInput():
+        case ChunkWithHistory():
             return step_gaze(state, event, now, timed_out)
         case GazeChunk():
-            return step_gaze(state, GazeInput(event), now, timed_out)
+            return step_gaze(state, ChunkWithHistory(event), now, timed_out)
     return Step(state)
 
 

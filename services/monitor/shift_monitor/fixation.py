@@ -13,7 +13,7 @@ from typing import NamedTuple
 from shift_schemas.timestamps import NS
 from shift_study.constants import FixationSettings
 
-from shift_monitor.median import EMPTY, Filter, Point, flush, pop_ready, push, set_duration
+from shift_monitor.median import EMPTY, MedianWindow, Point, flush, pop_ready, push, set_duration
 
 LONGEST_CANDIDATE = 1024
 """Chosen: the most samples that wait to become a fixation, 0.06 s at 17 kHz; beyond, the oldest are dropped."""
@@ -56,13 +56,13 @@ class Detector(NamedTuple):
 
     None if that sample is the newest one or if there was no valid sample.
     """
-    filter: Filter = EMPTY
+    filter: MedianWindow = EMPTY
     candidate: tuple[Point, ...] = ()
     """Filtered samples that may become a fixation."""
     open: OpenFixation | None = None
 
 
-class Found(NamedTuple):
+class EndedFixation(NamedTuple):
     """A fixation that has ended: start and end on the source's clock, mean position (0..1)."""
 
     start_ns: int
@@ -71,11 +71,11 @@ class Found(NamedTuple):
     y: float
 
 
-class Output(NamedTuple):
+class FixationUpdate(NamedTuple):
     """The result of one sample: the samples inside a fixation, in order, and the fixations that ended."""
 
     dwells: list[Point]
-    found: list[Found]
+    found: list[EndedFixation]
 
 
 def rule_of(settings: FixationSettings) -> FixationRule:
@@ -92,7 +92,7 @@ def rule_of(settings: FixationSettings) -> FixationRule:
 
 def update(
     detector: Detector, t_ns: int, point: tuple[float, float] | None, rule: FixationRule
-) -> tuple[Detector, Output]:
+) -> tuple[Detector, FixationUpdate]:
     """Return the detector after one more sample, and the sample's result.
 
     Parameters
@@ -102,7 +102,7 @@ def update(
     point
         The position on the stimulus (0..1), or None for a lost sample.
     """
-    output = Output([], [])
+    output = FixationUpdate([], [])
     filter, covered_ns = detector.filter, detector.covered_ns
     if covered_ns is None and detector.last_ns is not None and filter.points:
         duration_ns = min(t_ns - detector.last_ns, rule.gap_ns)
@@ -121,12 +121,12 @@ def update(
     return Detector(t_ns, covered_ns, filter, candidate, open_), output
 
 
-def finish(detector: Detector, rule: FixationRule) -> Output:
+def finish(detector: Detector, rule: FixationRule) -> FixationUpdate:
     """Return the remaining result when no sample follows.
 
     An open fixation ends. The last sample has no dwell.
     """
-    output = Output([], [])
+    output = FixationUpdate([], [])
     _finish(detector.filter, detector.candidate, detector.open, rule, output)
     return output
 
@@ -143,7 +143,11 @@ def dispersion_deg(left: float, right: float, top: float, bottom: float, rule: F
 
 
 def _finish(
-    filter: Filter, candidate: tuple[Point, ...], open_: OpenFixation | None, rule: FixationRule, output: Output
+    filter: MedianWindow,
+    candidate: tuple[Point, ...],
+    open_: OpenFixation | None,
+    rule: FixationRule,
+    output: FixationUpdate,
 ) -> None:
     for filtered in flush(filter, rule.half_filter_ns):
         candidate, open_ = _detect(candidate, open_, filtered, rule, output)
@@ -152,7 +156,7 @@ def _finish(
 
 
 def _detect(
-    candidate: tuple[Point, ...], open_: OpenFixation | None, point: Point, rule: FixationRule, output: Output
+    candidate: tuple[Point, ...], open_: OpenFixation | None, point: Point, rule: FixationRule, output: FixationUpdate
 ) -> tuple[tuple[Point, ...], OpenFixation | None]:
     """Make one step of I-DT with a filtered sample."""
     if open_ is not None:
@@ -165,7 +169,7 @@ def _detect(
 
 
 def _search(
-    candidate: tuple[Point, ...], rule: FixationRule, output: Output
+    candidate: tuple[Point, ...], rule: FixationRule, output: FixationUpdate
 ) -> tuple[tuple[Point, ...], OpenFixation | None]:
     """Open a fixation where the window that covers the minimum duration is small; else drop its first sample.
 
@@ -201,5 +205,5 @@ def _is_small(o: OpenFixation, rule: FixationRule) -> bool:
     return dispersion_deg(o.left, o.right, o.top, o.bottom, rule) <= rule.dispersion_deg
 
 
-def _close(o: OpenFixation) -> Found:
-    return Found(o.start_ns, o.end_ns, o.sum_x / o.samples, o.sum_y / o.samples)
+def _close(o: OpenFixation) -> EndedFixation:
+    return EndedFixation(o.start_ns, o.end_ns, o.sum_x / o.samples, o.sum_y / o.samples)

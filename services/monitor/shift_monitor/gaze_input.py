@@ -18,7 +18,7 @@ Recall = Callable[..., Iterable[Fact]]
 COLUMNS = ("x", "y", "valid", "aoi")
 
 
-class Earlier(NamedTuple):
+class RecordedChunk(NamedTuple):
     """The record of one number of a source. Without ``columns`` its content is known to be different."""
 
     segment: int
@@ -28,27 +28,27 @@ class Earlier(NamedTuple):
     """The times, and the other columns by name."""
 
 
-class GazeInput(NamedTuple):
+class ChunkWithHistory(NamedTuple):
     """A chunk, and the records of its source and number, oldest first."""
 
     chunk: GazeChunk
-    earlier: tuple[Earlier, ...] = ()
+    earlier: tuple[RecordedChunk, ...] = ()
 
 
-def gaze_input(chunk: GazeChunk, recall: Recall) -> GazeInput:
+def gaze_input(chunk: GazeChunk, recall: Recall) -> ChunkWithHistory:
     """Return the chunk with everything that the monitor recorded under its number."""
     found = recall("gaze", source=chunk.source, seq=chunk.seq)
-    return GazeInput(chunk, tuple(earlier_of(fact) for fact in found if isinstance(fact, Gaze)))
+    return ChunkWithHistory(chunk, tuple(earlier_of(fact) for fact in found if isinstance(fact, Gaze)))
 
 
-def earlier_of(fact: Gaze) -> Earlier:
+def earlier_of(fact: Gaze) -> RecordedChunk:
     """Return the record that a later chunk of the same number is compared with."""
     accepted = len(fact.t) if fact.outcome == "applied" else 0
     columns: dict[str, list[object]] = {name: getattr(fact, name) for name in COLUMNS}
-    return Earlier(fact.segment, accepted, tuple(fact.warnings), (fact.t, columns))
+    return RecordedChunk(fact.segment, accepted, tuple(fact.warnings), (fact.t, columns))
 
 
-def find_repeated(gaze: GazeInput) -> Earlier | None:
+def find_repeated(gaze: ChunkWithHistory) -> RecordedChunk | None:
     """Return the record of the very same chunk, or None if there is none."""
     if not gaze.earlier:
         return None

@@ -25,7 +25,7 @@ from shift_monitor.chunk_sequence import (
 from shift_monitor.fixation import finish
 from shift_monitor.gaze_account import end_segment
 from shift_monitor.gaze_checks import check_rise, check_samples
-from shift_monitor.gaze_input import GazeInput, find_repeated
+from shift_monitor.gaze_input import ChunkWithHistory, find_repeated
 from shift_monitor.gaze_stream import IDLE, GazeStream, apply_fixation_dwell, apply_names, apply_points
 from shift_monitor.gaze_warnings import (
     clock_restart_warning,
@@ -37,7 +37,7 @@ from shift_monitor.gaze_warnings import (
     share_warnings,
 )
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
-from shift_monitor.published import EndedFixation, fixation_fact, gaze_fact, gaze_result, publish
+from shift_monitor.published import SourcedFixation, fixation_fact, gaze_fact, gaze_result, publish
 from shift_monitor.state import MonitorState, study_in_force
 
 MOST_SOURCES = 256
@@ -52,12 +52,12 @@ class Continuation(NamedTuple):
 
     state: MonitorState
     stream: GazeStream
-    ended: list[EndedFixation]
+    ended: list[SourcedFixation]
     """The fixations that ended before the chunk."""
     warnings: list[str]
 
 
-def step_gaze(state: MonitorState, gaze: GazeInput, now: Stamp, timed_out: bool) -> Step[MonitorState]:
+def step_gaze(state: MonitorState, gaze: ChunkWithHistory, now: Stamp, timed_out: bool) -> Step[MonitorState]:
     """Apply one chunk of gaze, or answer a repeated one as before.
 
     ``timed_out`` says that the chunk no longer waits for the session's configuration. The errors are those of
@@ -86,7 +86,7 @@ def step_gaze(state: MonitorState, gaze: GazeInput, now: Stamp, timed_out: bool)
             return _apply_chunk(_continue_stream(state, stream, chunk), chunk, times, now)
 
 
-def close_stream(state: MonitorState) -> tuple[MonitorState, list[EndedFixation]]:
+def close_stream(state: MonitorState) -> tuple[MonitorState, list[SourcedFixation]]:
     """Return the state when no more gaze comes from its source, and the open fixation, which ends."""
     if state.stream is None:
         return state, []
@@ -113,7 +113,7 @@ def _check_source(state: MonitorState, chunk: GazeChunk) -> None:
         raise Conflict(f"session {state.session} had {MOST_SOURCES} gaze sources replaced; it takes no more")
 
 
-def _arrival(state: MonitorState, stream: GazeStream, gaze: GazeInput, times: list[int]) -> Arrival:
+def _arrival(state: MonitorState, stream: GazeStream, gaze: ChunkWithHistory, times: list[int]) -> Arrival:
     seq, last_ns = gaze.chunk.seq, stream.last_ns
     used = any(e.segment == stream.segment for e in gaze.earlier)
     continues = last_ns is None or times[0] >= last_ns

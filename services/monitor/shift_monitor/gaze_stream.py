@@ -12,7 +12,7 @@ from shift_schemas.messages import GazeChunk
 from shift_monitor.areas import NOWHERE, area_at
 from shift_monitor.attention import Attention, Dwell, apply_dwell, mark_aoi_seen
 from shift_monitor.chunk_sequence import ChunkSequence
-from shift_monitor.fixation import Detector, Found, Output, update
+from shift_monitor.fixation import Detector, EndedFixation, FixationUpdate, update
 from shift_monitor.gaze_account import (
     EMPTY_ACCOUNT,
     LOST,
@@ -49,9 +49,9 @@ class GazeStream:
 
 def apply_points(
     stream: GazeStream, attention: Attention, times: list[int], chunk: GazeChunk, prepared: PreparedStudy
-) -> tuple[GazeStream, Attention, list[Found]]:
+) -> tuple[GazeStream, Attention, list[EndedFixation]]:
     """Apply points through fixation detection; only samples inside a fixation count as dwell."""
-    found: list[Found] = []
+    found: list[EndedFixation] = []
     detector, account = stream.detector, stream.account
     kinds: list[int] = []
     for t_ns, point in zip(times, points_of(chunk), strict=True):
@@ -73,7 +73,7 @@ def _kind(point: tuple[float, float] | None) -> int:
 
 
 def apply_fixation_dwell(
-    attention: Attention, account: GazeAccount, output: Output, prepared: PreparedStudy
+    attention: Attention, account: GazeAccount, output: FixationUpdate, prepared: PreparedStudy
 ) -> tuple[Attention, GazeAccount]:
     """Apply the dwell of the samples inside a fixation, each on the AOI at its filtered position."""
     rule, settings = prepared.rule, prepared.study.attention

@@ -17,38 +17,38 @@ LONGEST_WINDOW = 256
 """Chosen: the most samples that are kept, 30 ms at 8 kHz; those of a faster source are ready early."""
 
 
-class Filter(NamedTuple):
+class MedianWindow(NamedTuple):
     """The samples within reach; the last ``waiting`` of them are not filtered yet."""
 
     points: tuple[Point, ...] = ()
     waiting: int = 0
 
 
-EMPTY = Filter()
+EMPTY = MedianWindow()
 
 
-def push(filter: Filter, point: Point) -> Filter:
+def push(filter: MedianWindow, point: Point) -> MedianWindow:
     """Return the filter with one more sample, which waits."""
-    return Filter((*filter.points, point), filter.waiting + 1)
+    return MedianWindow((*filter.points, point), filter.waiting + 1)
 
 
-def set_duration(filter: Filter, duration_ns: int) -> Filter:
+def set_duration(filter: MedianWindow, duration_ns: int) -> MedianWindow:
     """Return the filter with the duration of its newest sample, which is known once the next sample is there."""
     t_ns, x, y, _ = filter.points[-1]
-    return Filter((*filter.points[:-1], (t_ns, x, y, duration_ns)), filter.waiting)
+    return MedianWindow((*filter.points[:-1], (t_ns, x, y, duration_ns)), filter.waiting)
 
 
-def pop_ready(filter: Filter, now_ns: int, half_ns: int) -> tuple[Filter, list[Point]]:
+def pop_ready(filter: MedianWindow, now_ns: int, half_ns: int) -> tuple[MedianWindow, list[Point]]:
     """Return the rest of the filter, and the filtered samples that no sample from ``now_ns`` on can change."""
     points, waiting, ready = filter.points, filter.waiting, []
     while waiting and (points[-waiting][0] + half_ns < now_ns or len(points) > LONGEST_WINDOW):
         ready.append(_filtered(points, len(points) - waiting, half_ns))
         waiting -= 1
         points = _within_reach(points, waiting, now_ns - half_ns, half_ns)
-    return (Filter(points, waiting), ready) if ready else (filter, ready)
+    return (MedianWindow(points, waiting), ready) if ready else (filter, ready)
 
 
-def flush(filter: Filter, half_ns: int) -> list[Point]:
+def flush(filter: MedianWindow, half_ns: int) -> list[Point]:
     """Return all samples that still wait, filtered, when no sample follows."""
     points = filter.points
     return [_filtered(points, i, half_ns) for i in range(len(points) - filter.waiting, len(points))]

@@ -23,13 +23,13 @@ from shift_schemas.timestamps import NS, Stamp
 from shift_monitor.areas import area_at
 from shift_monitor.attention import gaze_class
 from shift_monitor.awareness import awareness_views
-from shift_monitor.fixation import Found
+from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_account import EMPTY_ACCOUNT, shares
 from shift_monitor.gaze_columns import recorded_columns
 from shift_monitor.prepared_study import name_of, prepare_study
 from shift_monitor.state import MonitorState
 
-EndedFixation = tuple[str, int, Found]
+SourcedFixation = tuple[str, int, EndedFixation]
 """A fixation that ended, with its source and segment."""
 
 
@@ -76,7 +76,7 @@ def gaze_fact(state: MonitorState, chunk: GazeChunk, now: Stamp, outcome: GazeOu
     )  # fmt: skip
 
 
-def fixation_fact(state: MonitorState, ended: EndedFixation, now: Stamp) -> Fixation:
+def fixation_fact(state: MonitorState, ended: SourcedFixation, now: Stamp) -> Fixation:
     """Return the record of a fixation that ended."""
     source, segment, (start_ns, end_ns, x, y) = ended
     prepared = prepare_study(state.study)

@@ -31,7 +31,7 @@ CHUNK_BYTES = 2 * 2**20
 _CACHE_BYTES = 32 * 2**20
 _EVERY = 1000
 
-Progress = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 """Told now and then how many messages of how many are written."""
 Ints = NDArray[np.int64]
 
@@ -62,7 +62,7 @@ def finish_recording(
     schemas: Mapping[str, bytes],
     metadata: Mapping[str, Mapping[str, str]],
     attachments: Iterable[Attachment],
-    progress: Progress | None = None,
+    progress: OnProgress | None = None,
 ) -> FinishedRecording:
     """Merges ``sources`` into the finished recording ``target``.
 
@@ -205,7 +205,7 @@ def _write_front(
         writer.attachment(attachment)
 
 
-def _write_messages(writer: RecordingWriter, index: _Index, order: Ints, progress: Progress | None) -> dict[str, int]:
+def _write_messages(writer: RecordingWriter, index: _Index, order: Ints, progress: OnProgress | None) -> dict[str, int]:
     chunks = _Chunks(index)
     counts: dict[str, int] = {}
     for start in range(0, len(order), _EVERY):

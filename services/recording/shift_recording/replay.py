@@ -30,7 +30,7 @@ from shift_recording.mcap.reader import RecordedFact, Recording, recorded_fact
 LONGEST_ID = 63
 LONGEST_PAUSE_S = 10.0
 """Chosen: longer than the pauses of an interaction, and nobody waits through a step of the clock or a lunch break."""
-Progress = Callable[[float, int], None]
+OnProgress = Callable[[float, int], None]
 """Told the position in the recording, s, and how many facts were published."""
 
 
@@ -202,7 +202,9 @@ async def check_free(bus: Bus, session: str) -> None:
             raise Conflict(f"there is a session {session} already; name another one for the replay")
 
 
-async def play(put: Publish, replay: Replay, extent: Extent, pacer: Pacer, on_progress: Progress | None = None) -> int:
+async def play(
+    put: Publish, replay: Replay, extent: Extent, pacer: Pacer, on_progress: OnProgress | None = None
+) -> int:
     """Publish the facts, each when its time has come; how many.
 
     Ends with the recording, or with ``loop`` only by being cancelled. Raises as :meth:`Recording.facts`.

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-from shift_learner.learner import Context, Learner, Taken
+from shift_learner.learner import Context, DecisionView, Learner
 from shift_learner.learners import learner_named
 from shift_learner.learners.planning import engine
 from shift_model.q_learning import decayed_epsilon, updated_value
@@ -139,7 +139,7 @@ class OneByOne:
     def __init__(self, context: Context, learner: Learner, runs: int) -> None:
         self._context, self._learner = context, learner
         self._memories: list[Any] = [learner.initial(context) for _ in range(runs)]
-        self._taken: list[Taken] = []
+        self._taken: list[DecisionView] = []
         self._n = 0
 
     def decide(self, triple: Ints, u: Floats) -> Ints:
@@ -148,12 +148,12 @@ class OneByOne:
         self._taken = [self._decide_run(run, int(t), float(u[run])) for run, t in enumerate(triple)]
         return np.array([taken.action for taken in self._taken])
 
-    def _decide_run(self, run: int, triple: int, u: float) -> Taken:
+    def _decide_run(self, run: int, triple: int, u: float) -> DecisionView:
         state = self._context.suggestions[triple]
         memory = self._memories[run]
         row = self._learner.row(self._context, memory, triple if self._learner.on_triples else state).probabilities
         action = pick(row, u)
-        taken = Taken(self._n, triple, state, action, row[action])
+        taken = DecisionView(self._n, triple, state, action, row[action])
         self._memories[run] = self._learner.on_decision(self._context, memory, taken)
         return taken
 

@@ -18,13 +18,13 @@ from shift_simulator.table2 import EPISODES
 from shift_simulator.user_study import crossing
 from shift_simulator.users import User
 
-Progress = Callable[[str], None]
+OnProgress = Callable[[str], None]
 INTERVAL = 1.96
 """Half the width of a 95 % interval, in standard errors of a normal distribution."""
 
 
 def compare(
-    names: Sequence[str], people: Sequence[User], seed: int, runs: int, regret: bool, report_progress: Progress
+    names: Sequence[str], people: Sequence[User], seed: int, runs: int, regret: bool, report_progress: OnProgress
 ) -> dict[str, Any]:
     """Return the results of every learner with every user on the same sessions (docs/interface.md, "Command line").
 

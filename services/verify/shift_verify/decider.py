@@ -16,7 +16,7 @@ from shift_schemas.messages import Command, Config, Decide, Decision, Estimate, 
 
 from shift_verify.decider_before_format_3 import DeciderSearch
 from shift_verify.decider_outputs import DeciderDerivation, DeciderOutputs, is_of_task, override_command
-from shift_verify.difference import Placed, differ, is_missing
+from shift_verify.difference import FactAtPlace, differ, is_missing
 from shift_verify.inputs import Inputs
 
 FIRST_FORMAT_OF_FOLD = 3
@@ -24,7 +24,7 @@ FIRST_FORMAT_OF_FOLD = 3
 
 
 def decider_verification(
-    inputs: Inputs, outputs: Sequence[Placed], following: Placed | None = None
+    inputs: Inputs, outputs: Sequence[FactAtPlace], following: FactAtPlace | None = None
 ) -> DeciderDerivation:
     """Return the verification for the format of the session; see :class:`DeciderOutputs` for the parameters."""
     kind = DeciderFold if inputs.session.format >= FIRST_FORMAT_OF_FOLD else DeciderSearch
@@ -38,7 +38,7 @@ class DeciderFold(DeciderDerivation):
         super().__init__(inputs, outputs)
         self.state: DeciderState = step(None, inputs.session, inputs.session.stamp).state
         self._stopped = False
-        self._latest_required: Placed | None = None
+        self._latest_required: FactAtPlace | None = None
         """The decision that required the latest observation."""
 
     @property
@@ -71,7 +71,7 @@ class DeciderFold(DeciderDerivation):
             while self.configured < target.fact.seen.config:
                 self._apply(self._next_config(target))
 
-    def _next_config(self, target: Placed) -> Fact:
+    def _next_config(self, target: FactAtPlace) -> Fact:
         return self.inputs.get("config", self.configured + 1, target)
 
     def _apply(self, given: Fact) -> None:
@@ -104,13 +104,13 @@ class DeciderFold(DeciderDerivation):
         self.outputs.compare_estimates(after.facts, cause)
         self.state = after.state
 
-    def _is_first_of(self, target: Placed, first: Fact) -> bool:
+    def _is_first_of(self, target: FactAtPlace, first: Fact) -> bool:
         """Return whether ``target`` is recorded as the first estimate of the input that publishes ``first``."""
         seen = target.fact.seen
         is_seen = (seen.observation, seen.config) == (first.seen.observation, first.seen.config)
         return is_seen and isinstance(target.fact, Estimate)
 
-    def _raise_unexpected(self, target: Placed, given: Observation | Config, first: Fact) -> NoReturn:
+    def _raise_unexpected(self, target: FactAtPlace, given: Observation | Config, first: Fact) -> NoReturn:
         """Raise why ``target`` stands where ``first`` should: its ``seen`` is wrong, or ``first`` is missing."""
         field = f"seen.{given.subject}"
         recorded = getattr(target.fact.seen, given.subject)
@@ -141,7 +141,7 @@ class DeciderFold(DeciderDerivation):
             else:
                 self._derive_answer(target)
 
-    def _derive_answer(self, target: Placed) -> None:
+    def _derive_answer(self, target: FactAtPlace) -> None:
         """Derive a decision or an override: every estimate of the inputs so far has been compared already."""
         fact = target.fact
         if self.outputs.at_gap:
@@ -152,7 +152,7 @@ class DeciderFold(DeciderDerivation):
         state = self.outputs.with_policy(self.state, target)
         self.state = self.outputs.compare_answer(state, target, [self._command(target)])
 
-    def _command(self, target: Placed) -> Command:
+    def _command(self, target: FactAtPlace) -> Command:
         fact = target.fact
         if isinstance(fact, Override):
             return override_command(fact)
@@ -170,14 +170,14 @@ class DeciderFold(DeciderDerivation):
             self._latest_required = target
         return Decide(command_id=fact.decision_id, session=fact.session, task=fact.task, need=fact.required)
 
-    def _check_required(self, target: Placed, subject: str, most: int) -> None:
+    def _check_required(self, target: FactAtPlace, subject: str, most: int) -> None:
         """Raise :class:`Differs` if ``target`` required more than there was: nobody can have been told of it."""
         n = getattr(_required(target), subject)
         if n > most:
             differ(target, f"required.{subject}", n, most, f"it required {subject} {n}, and there were {most}")
 
 
-def _check_versions(target: Placed) -> None:
+def _check_versions(target: FactAtPlace) -> None:
     """Raise :class:`Differs` if the ``versions`` of a decision do not repeat what it has ``seen``."""
     if not isinstance(target.fact, Decision):
         return
@@ -188,7 +188,7 @@ def _check_versions(target: Placed) -> None:
             differ(target, f"versions.{subject}", version, seen, why)
 
 
-def _required(target: Placed) -> Seen:
+def _required(target: FactAtPlace) -> Seen:
     assert isinstance(target.fact, Decision)
     assert target.fact.required is not None
     return target.fact.required

@@ -16,10 +16,10 @@ from shift_decider.core import DeciderState, step
 from shift_schemas.messages import Command, Config, Decide, Decision, Estimate, Fact, Observation, Override, Seen
 
 from shift_verify.decider_outputs import DeciderDerivation, DeciderOutputs, is_of_task, override_command
-from shift_verify.difference import Differs, Placed, differ, is_missing
+from shift_verify.difference import Differs, FactAtPlace, differ, is_missing
 from shift_verify.inputs import Inputs
 
-Transition = tuple[DeciderState, Observation | Config]
+InputEdge = tuple[DeciderState, Observation | Config]
 """A state, and an input that leads on from it."""
 
 
@@ -45,7 +45,7 @@ class DeciderSearch(DeciderDerivation):
         self.latest = observation
         self.before, self.column = self.column, []
         for k, from_left in enumerate(self.before):
-            transitions: list[Transition] = [(from_left, observation)] if from_left else []
+            transitions: list[InputEdge] = [(from_left, observation)] if from_left else []
             transitions += self._by_config(k)
             self.column.append(self._without_output(transitions))
         self.derive_outputs()
@@ -67,13 +67,13 @@ class DeciderSearch(DeciderDerivation):
             self.column.append(None)
             self.column[k] = self._without_output(self._by_config(k))
 
-    def _by_config(self, k: int) -> list[Transition]:
+    def _by_config(self, k: int) -> list[InputEdge]:
         """Return the transition to row ``k`` of the column by its configuration, if there is one."""
         below = self.column[k - 1] if k else None
         config = self.inputs.numbered["config"].get(self.configured + k)
         return [(below, config)] if below is not None and isinstance(config, Config) else []
 
-    def _without_output(self, transitions: list[Transition]) -> DeciderState | None:
+    def _without_output(self, transitions: list[InputEdge]) -> DeciderState | None:
         """Return the state after the first of ``transitions`` that publishes nothing."""
         for state, given in transitions:
             after = step(state, given, given.stamp)
@@ -95,7 +95,7 @@ class DeciderSearch(DeciderDerivation):
             self.before, self.column, self.unrecorded = [], [state], None
             self._extend_column()
 
-    def _row(self, target: Placed) -> int:
+    def _row(self, target: FactAtPlace) -> int:
         seen = target.fact.seen
         if seen.observation < self.observed:
             differ(target, "seen.observation", seen.observation, self.observed)
@@ -105,14 +105,14 @@ class DeciderSearch(DeciderDerivation):
             self.inputs.get("config", seen.config, target)
         return seen.config - self.configured
 
-    def _transitions(self, k: int) -> list[Transition]:
+    def _transitions(self, k: int) -> list[InputEdge]:
         """Return the last inputs that can have led to row ``k``, each with the state before it."""
         transitions = self._by_config(k)
         if self.latest is not None and k < len(self.before) and (from_left := self.before[k]) is not None:
             transitions.append((from_left, self.latest))
         return transitions
 
-    def _estimated(self, target: Placed, k: int) -> DeciderState:
+    def _estimated(self, target: FactAtPlace, k: int) -> DeciderState:
         """Return the state after the last input before ``target``, which is the first of its estimates."""
         first: Differs | None = None
         for state, given in self._transitions(k):
@@ -124,14 +124,14 @@ class DeciderSearch(DeciderDerivation):
             self.outputs.raise_unreached(target, self.unrecorded)
         raise first
 
-    def _compared(self, target: Placed, state: DeciderState, given: Observation | Config) -> DeciderState:
+    def _compared(self, target: FactAtPlace, state: DeciderState, given: Observation | Config) -> DeciderState:
         after = step(state, given, target.fact.stamp)
         if not after.facts:
             differ(target, "", target.fact.subject, None, f"nothing changed with {given.subject} {given.version}")
         self.outputs.compare_estimates(after.facts, f"{given.subject} {given.version} changes it")
         return after.state
 
-    def _answered(self, target: Placed, k: int) -> DeciderState:
+    def _answered(self, target: FactAtPlace, k: int) -> DeciderState:
         """Return the state after a decision or an override."""
         reached = self.column[k] if k < len(self.column) else None
         if reached is None:
@@ -139,7 +139,7 @@ class DeciderSearch(DeciderDerivation):
         state = self.outputs.with_policy(reached, target)
         return self.outputs.compare_answer(state, target, _commands(target.fact, state, self.inputs))
 
-    def _is_next(self, target: Placed, k: int) -> bool:
+    def _is_next(self, target: FactAtPlace, k: int) -> bool:
         """Return whether ``target`` can be the next output, apart from the answer to a command."""
         if not isinstance(target.fact, Estimate):
             return k < len(self.column) and self.column[k] is not None

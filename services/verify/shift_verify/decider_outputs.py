@@ -14,7 +14,7 @@ from shift_decider.core import DeciderState, step
 from shift_schemas.errors import ShiftError
 from shift_schemas.messages import Command, Decision, Estimate, Fact, Observation, Override, Policy, SetOverride
 
-from shift_verify.difference import Differs, Placed, compare, differ, is_missing, name_of
+from shift_verify.difference import Differs, FactAtPlace, compare, differ, is_missing, name_of
 from shift_verify.inputs import Inputs
 
 
@@ -31,7 +31,7 @@ class DeciderOutputs:
         The fact after a gap, if there is one.
     """
 
-    def __init__(self, inputs: Inputs, outputs: Sequence[Placed], following: Placed | None = None) -> None:
+    def __init__(self, inputs: Inputs, outputs: Sequence[FactAtPlace], following: FactAtPlace | None = None) -> None:
         self.inputs = inputs
         self.outputs = outputs
         self.following = following
@@ -41,7 +41,7 @@ class DeciderOutputs:
         """The number of decisions before the position."""
 
     @property
-    def target(self) -> Placed | None:
+    def target(self) -> FactAtPlace | None:
         """The next output; the fact after the gap, if the position is at the gap; or ``None``."""
         return self.following if self.at_gap else self.outputs[self.next]
 
@@ -56,11 +56,11 @@ class DeciderOutputs:
         return self.outputs[self.next - 1].sequence if self.next else 0
 
     @property
-    def later(self) -> Placed | None:
+    def later(self) -> FactAtPlace | None:
         """The output after ``target``."""
         return self.outputs[self.next + 1] if self.next + 1 < len(self.outputs) else None
 
-    def with_policy(self, state: DeciderState, target: Placed) -> DeciderState:
+    def with_policy(self, state: DeciderState, target: FactAtPlace) -> DeciderState:
         """Return the state with the policy that ``target`` has seen. Raises :class:`Differs`, ``NotRecorded``."""
         n, before = target.fact.seen.policy, state.policy.version if state.policy else 0
         if n == before:
@@ -83,7 +83,7 @@ class DeciderOutputs:
             is_missing(derived[0].subject, last.sequence + 1, last.place, cause, derived[len(recorded)])
         self._move_past(recorded)
 
-    def compare_answer(self, state: DeciderState, target: Placed, commands: Iterable[Command]) -> DeciderState:
+    def compare_answer(self, state: DeciderState, target: FactAtPlace, commands: Iterable[Command]) -> DeciderState:
         """Compare a decision or an override with the answer to the first of ``commands`` that gives it.
 
         Return the state after it. Raise the difference from the answer to the first command if none gives it.
@@ -105,12 +105,12 @@ class DeciderOutputs:
         assert first is not None
         raise first
 
-    def _move_past(self, recorded: Sequence[Placed]) -> None:
+    def _move_past(self, recorded: Sequence[FactAtPlace]) -> None:
         self.next += len(recorded)
         self.checked.update(placed.fact.subject for placed in recorded)
         self.decisions += sum(isinstance(placed.fact, Decision) for placed in recorded)
 
-    def raise_lost(self, target: Placed, otherwise: str) -> NoReturn:
+    def raise_lost(self, target: FactAtPlace, otherwise: str) -> NoReturn:
         """Raise which message is lost in the gap before ``target``: a decision by its number, else ``otherwise``."""
         numbers = self.inputs.numbered["decision"]
         claimed = max([self.inputs.claimed.get("decision", 0), *numbers])
@@ -118,7 +118,7 @@ class DeciderOutputs:
         why = f"number {self.sequence + 1} of the decider's messages is not in the recording"
         is_missing("decision" if is_decision else otherwise, self.sequence + 1, target.place, why)
 
-    def raise_unreached(self, target: Placed, derived: Fact | None) -> NoReturn:
+    def raise_unreached(self, target: FactAtPlace, derived: Fact | None) -> NoReturn:
         """Raise that ``target`` cannot be the next output: an estimate is missing, or its ``seen`` is wrong.
 
         ``derived`` is the estimate that would have to be recorded before ``target``.
@@ -167,7 +167,7 @@ class DeciderDerivation:
         raise NotImplementedError
 
 
-def _stands_for_later(recorded: Sequence[Placed], derived: Sequence[Fact]) -> bool:
+def _stands_for_later(recorded: Sequence[FactAtPlace], derived: Sequence[Fact]) -> bool:
     """Return whether the first recorded output is one that follows the first derived one, which is then missing."""
     fact, seen = recorded[0].fact, recorded[0].fact.seen
     if not isinstance(fact, Estimate):
@@ -185,7 +185,7 @@ def override_command(fact: Override) -> SetOverride:
     )  # fmt: skip
 
 
-def is_of_task(target: Placed, derived: Fact) -> bool:
+def is_of_task(target: FactAtPlace, derived: Fact) -> bool:
     """Return whether ``target`` is an estimate of the same task as ``derived``."""
     fact = target.fact
     return isinstance(fact, Estimate) and isinstance(derived, Estimate) and fact.task == derived.task

@@ -19,7 +19,7 @@ LAST = 2**61
 """A place after all messages: a difference there comes first only if no message differs."""
 
 
-class Placed(NamedTuple):
+class FactAtPlace(NamedTuple):
     """A recorded fact, with its owner's sequence and its place in the file."""
 
     place: int
@@ -66,7 +66,7 @@ class NotRecorded(Exception):
     """An unfinished recording lacks an input that an output has seen, so nothing more can be derived."""
 
 
-def differ(at: Placed, field: str, recorded: Any, derived: Any, why: str = "") -> NoReturn:
+def differ(at: FactAtPlace, field: str, recorded: Any, derived: Any, why: str = "") -> NoReturn:
     """Raise that ``field`` of a recorded fact differs from the derived value."""
     subject = at.fact.subject
     said = why or f"{field or 'it'} is {_said(recorded)} in the recording and {_said(derived)} derived again"
@@ -87,7 +87,7 @@ def name_of(subject: str, sequence: int) -> str:
     return f"{subject} ({OWNER_OF[subject]}'s message {sequence})"
 
 
-def compare(recorded: Placed, derived: Fact) -> None:
+def compare(recorded: FactAtPlace, derived: Fact) -> None:
     """Raise :class:`Differs` with the first field in which both differ."""
     fact = recorded.fact
     if fact == derived:

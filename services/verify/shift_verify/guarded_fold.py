@@ -9,7 +9,7 @@ from typing import Any
 from shift_schemas.errors import ShiftError, shorten
 from shift_schemas.messages import Observation
 
-from shift_verify.difference import LAST, Difference, Differs, NotRecorded, Placed
+from shift_verify.difference import LAST, Difference, Differs, FactAtPlace, NotRecorded
 
 FAILURES = (ShiftError, ValueError, LookupError, TypeError, AssertionError)
 """What a core can raise if it is given nonsense."""
@@ -45,11 +45,11 @@ class GuardedFold:
         checked: Counter[str] = self._fold.checked
         return checked
 
-    def take(self, given: Placed | Observation) -> None:
+    def take(self, given: FactAtPlace | Observation) -> None:
         """Derive up to the next fact."""
         self._do(self._fold.take, given)
 
-    def gap(self, following: Placed) -> None:
+    def gap(self, following: FactAtPlace) -> None:
         """Report what is lost before ``following``, and stop."""
         self._do(self._fold.gap, following)
         self._stopped = True

@@ -9,7 +9,7 @@ from typing import NoReturn
 from shift_schemas.lifecycle import is_ending
 from shift_schemas.messages import Fact, Session
 
-from shift_verify.difference import NotRecorded, Placed, differ, is_missing
+from shift_verify.difference import FactAtPlace, NotRecorded, differ, is_missing
 
 NUMBER = {"config": "version", "decision": "n", "performance": "n", "policy": "version"}
 """The field that numbers the facts of a subject that other services read."""
@@ -43,7 +43,7 @@ class Inputs:
         """Return the largest number of a subject, 0 if there is none."""
         return max(self.numbered[subject], default=0)
 
-    def get(self, subject: str, n: int, by: Placed) -> Fact:
+    def get(self, subject: str, n: int, by: FactAtPlace) -> Fact:
         """Return the input that ``by`` has seen.
 
         Raises
@@ -58,7 +58,7 @@ class Inputs:
             self._raise_absent(subject, n, by)
         return found
 
-    def _raise_absent(self, subject: str, n: int, by: Placed) -> NoReturn:
+    def _raise_absent(self, subject: str, n: int, by: FactAtPlace) -> NoReturn:
         if not self.complete:
             raise NotRecorded(f"{by.fact.subject} {by.sequence} has seen {subject} {n}, which is not in the file yet")
         if n <= self.claimed.get(subject, 0):

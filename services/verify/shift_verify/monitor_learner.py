@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from shift_learner import core as learner
 from shift_monitor import core as monitor
-from shift_monitor.gaze_input import Earlier, GazeInput
+from shift_monitor.gaze_input import ChunkWithHistory, RecordedChunk
 from shift_schemas.core_protocol import Step
 from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import (
@@ -27,7 +27,7 @@ from shift_schemas.messages import (
 )
 from shift_schemas.timestamps import Stamp
 
-from shift_verify.difference import NotRecorded, Placed, differ
+from shift_verify.difference import FactAtPlace, NotRecorded, differ
 from shift_verify.inputs import Inputs
 from shift_verify.output_fold import OutputFold
 
@@ -47,7 +47,7 @@ class MonitorFold(OutputFold):
         """Return the step of the core, without waiting."""
         return monitor.step(state, event, now, timed_out=True)
 
-    def input_of(self, group: list[Placed]) -> object | None:
+    def input_of(self, group: list[FactAtPlace]) -> object | None:
         """Return the input of a group: gaze is its own input; otherwise exactly one number in ``seen`` is higher."""
         first, last = group[0].fact, group[-1]
         if isinstance(first, Gaze):
@@ -63,11 +63,11 @@ class MonitorFold(OutputFold):
             _raise_without_input(last, self.inputs.complete)
         return self.inputs.ending
 
-    def _gaze_input(self, fact: Gaze) -> GazeInput:
+    def _gaze_input(self, fact: Gaze) -> ChunkWithHistory:
         """Return the chunk with the segments of its source that had its number before, which show a restart."""
         used = self._numbers.setdefault((fact.source, fact.seq), ())
         self._numbers[fact.source, fact.seq] = (*used, fact.segment)
-        return GazeInput(monitor.gaze_chunk_of(fact), tuple(Earlier(segment) for segment in used))
+        return ChunkWithHistory(monitor.gaze_chunk_of(fact), tuple(RecordedChunk(segment) for segment in used))
 
     def remaining(self) -> Iterator[Fact]:
         """Yield the inputs that have not been applied."""
@@ -101,7 +101,7 @@ class LearnerFold(OutputFold):
         """Return the step of the core, without waiting."""
         return learner.step(state, event, now, timed_out=True)  # type: ignore[arg-type]
 
-    def input_of(self, group: list[Placed]) -> object | None:
+    def input_of(self, group: list[FactAtPlace]) -> object | None:
         """Return the input of a group: a performance's report, a configuration, a decision or the session's end."""
         first, last = group[0].fact, group[-1]
         if isinstance(first, Performance):
@@ -150,7 +150,7 @@ def _result_of(scored: ScoredResult) -> Result:
     return Result(success=scored.success, duration_s=scored.duration_s)
 
 
-def _raise_without_input(last: Placed, complete: bool) -> NoReturn:
+def _raise_without_input(last: FactAtPlace, complete: bool) -> NoReturn:
     if not complete:
         raise NotRecorded(f"{last.fact.subject} {last.sequence} follows from something that is not in the file yet")
     differ(last, "seen", last.fact.seen.model_dump(mode="json"), None, "it has seen no input that is new")

@@ -11,7 +11,7 @@ from shift_schemas.errors import ShiftError
 from shift_schemas.messages import Fact
 from shift_schemas.timestamps import Stamp
 
-from shift_verify.difference import Placed, compare, differ, is_missing
+from shift_verify.difference import FactAtPlace, compare, differ, is_missing
 from shift_verify.inputs import Inputs
 
 
@@ -27,7 +27,7 @@ class OutputFold:
 
     def __init__(self, inputs: Inputs) -> None:
         self.inputs = inputs
-        self.group: list[Placed] = []
+        self.group: list[FactAtPlace] = []
         self.checked: Counter[str] = Counter()
         self.sequence = 0
         self.state: Any = self.step(None, inputs.session, inputs.session.stamp).state
@@ -36,7 +36,7 @@ class OutputFold:
         """Return the step of the core, without waiting."""
         raise NotImplementedError
 
-    def input_of(self, group: list[Placed]) -> object | None:
+    def input_of(self, group: list[FactAtPlace]) -> object | None:
         """Return the input of this group, or ``None`` if the group is unfinished and does not say."""
         raise NotImplementedError
 
@@ -48,7 +48,7 @@ class OutputFold:
         """Return the subject of the message that is lost before ``following``, if no group is open."""
         raise NotImplementedError
 
-    def take(self, placed: Placed) -> None:
+    def take(self, placed: FactAtPlace) -> None:
         """Derive up to the owner's next fact. Raises :class:`Differs`, ``NotRecorded``."""
         self.group.append(placed)
         self.sequence = placed.sequence
@@ -58,7 +58,7 @@ class OutputFold:
             self.state = self._derive(event, whole=True).state
             self.group = []
 
-    def gap(self, following: Placed) -> None:
+    def gap(self, following: FactAtPlace) -> None:
         """Raise which message is lost before ``following``."""
         self._end_group(following.place)
         why = f"number {self.sequence + 1} of its sequence is not in the recording"

@@ -15,9 +15,9 @@ from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import Decision, Fact, Session
 from shift_schemas.registry import OWNER_OF, OWNERS, SUBJECTS
 
-from shift_verify.difference import Difference, Differs, Placed, differ, name_of
+from shift_verify.difference import Difference, Differs, FactAtPlace, differ, name_of
 
-Progress = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 """Called now and then with the number of derived messages and the number of all messages."""
 EVERY = 500
 
@@ -29,7 +29,7 @@ class OwnerMessages:
     sequence: array[int] = field(default_factory=lambda: array("Q"))
     topic: array[int] = field(default_factory=lambda: array("B"))
     place: array[int] = field(default_factory=lambda: array("Q"))
-    facts: list[Placed] = field(default_factory=list)
+    facts: list[FactAtPlace] = field(default_factory=list)
     """The facts; empty for the monitor, which publishes nearly all messages."""
 
     @cached_property
@@ -38,12 +38,12 @@ class OwnerMessages:
         return next((i for i, n in enumerate(self.sequence) if n != i + 1), len(self.sequence))
 
     @property
-    def unbroken_facts(self) -> list[Placed]:
+    def unbroken_facts(self) -> list[FactAtPlace]:
         """The facts before the first gap."""
         return self.facts[: self.unbroken]
 
     @property
-    def following(self) -> Placed | None:
+    def following(self) -> FactAtPlace | None:
         """The fact after the first gap, if there is one."""
         return self.facts[self.unbroken] if self.unbroken < len(self.facts) else None
 
@@ -78,7 +78,7 @@ class RecordedMessages:
             if message.topic == "policy":
                 self.policies = (self.policies[0] if self.policies else message.data, message.data)
 
-    def read_monitor(self, on_progress: Progress | None) -> Iterator[Placed]:
+    def read_monitor(self, on_progress: OnProgress | None) -> Iterator[FactAtPlace]:
         """Yield the monitor's messages in a second pass. Raises :class:`Differs`, ``DamagedRecording``."""
         mine = self.owners["monitor"]
         for i, message in enumerate(self.recording.messages(OWNERS["monitor"]), start=1):
@@ -125,10 +125,10 @@ class RecordedMessages:
         return self.complete or not mine.sequence or mine.sequence[0] == 1
 
 
-def _placed(place: int, message: RecordedMessage) -> Placed:
+def _placed(place: int, message: RecordedMessage) -> FactAtPlace:
     """Return the fact of a message. Raise :class:`Differs` if it is not valid, or its stamp differs from the file's."""
     try:
-        placed = Placed(place, message.sequence, fact_of(message.topic, message.data))
+        placed = FactAtPlace(place, message.sequence, fact_of(message.topic, message.data))
     except MalformedMessage as e:
         name = name_of(message.topic, message.sequence)
         difference = Difference(message.topic, message.sequence, "", None, None, f"{name}: {e.detail}")

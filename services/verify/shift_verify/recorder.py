@@ -28,7 +28,7 @@ from shift_schemas.messages import (
 from shift_study.loading import as_recorded
 from shift_study.patching import merge_patch_between
 
-from shift_verify.difference import Differs, Placed, compare, differ, is_missing
+from shift_verify.difference import Differs, FactAtPlace, compare, differ, is_missing
 
 
 class RecorderFold:
@@ -54,7 +54,7 @@ class RecorderFold:
         self.start: Session | None = None
         self._place = 0
 
-    def take(self, placed: Placed) -> None:
+    def take(self, placed: FactAtPlace) -> None:
         """Derive and compare the recorder's next fact. Raises :class:`Differs`."""
         fact, self.sequence = placed.fact, placed.sequence
         try:
@@ -68,7 +68,7 @@ class RecorderFold:
             differ(placed, "", fact.subject, None, f"the core refuses it: {e.detail}")
         self.checked[fact.subject] += 1
 
-    def gap(self, following: Placed) -> None:
+    def gap(self, following: FactAtPlace) -> None:
         """Raise which message is lost before ``following``."""
         why = f"number {self.sequence + 1} of the recorder's messages is not in the recording"
         is_missing(self._lost_subject(following.fact), self.sequence + 1, following.place, why)
@@ -82,12 +82,12 @@ class RecorderFold:
         live = self.state is not None and accepts_input(self.state.fact.state)
         return "session" if live and isinstance(following, Session) and has_ended(following.state) else "marker"
 
-    def _take_first(self, placed: Placed) -> None:
+    def _take_first(self, placed: FactAtPlace) -> None:
         if not isinstance(placed.fact, Session) or not accepts_input(placed.fact.state):
             differ(placed, "", placed.fact.subject, "session", "a recording begins with the session")
         self.start, self._place = placed.fact, placed.place
 
-    def _take_second(self, start: Session, placed: Placed) -> None:
+    def _take_second(self, start: Session, placed: FactAtPlace) -> None:
         """Derive the session and its first configuration, which answer one command."""
         config = placed.fact
         if not isinstance(config, Config):
@@ -96,10 +96,10 @@ class RecorderFold:
         if self.study is None:
             return
         derived = step(None, _start_of(start, as_recorded(json.loads(self.study))), start.stamp)
-        compare(Placed(placed.place - 1, placed.sequence - 1, start), derived.facts[0])
+        compare(FactAtPlace(placed.place - 1, placed.sequence - 1, start), derived.facts[0])
         compare(placed, derived.facts[1])
 
-    def _take_later(self, state: RecorderState, placed: Placed) -> None:
+    def _take_later(self, state: RecorderState, placed: FactAtPlace) -> None:
         """Derive a later fact. If two session facts contradict each other, the difference is at the first one."""
         try:
             compare(placed, self._next(state, placed))
@@ -109,7 +109,7 @@ class RecorderFold:
             place = self._place if isinstance(placed.fact, Session) else e.place
             raise Differs(place, e.difference) from e
 
-    def _next(self, state: RecorderState, placed: Placed) -> Fact:
+    def _next(self, state: RecorderState, placed: FactAtPlace) -> Fact:
         fact, now = placed.fact, placed.fact.stamp
         match fact:
             case Session() if has_ended(fact.state):

@@ -26,7 +26,7 @@ from shift_verify.guarded_fold import GuardedFold
 from shift_verify.inputs import Inputs
 from shift_verify.monitor_learner import LearnerFold, MonitorFold
 from shift_verify.provenance import check_provenance
-from shift_verify.recorded_messages import Progress, RecordedMessages
+from shift_verify.recorded_messages import OnProgress, RecordedMessages
 from shift_verify.recorder import RecorderFold
 
 
@@ -56,7 +56,7 @@ class VerifyReport:
         }  # fmt: skip
 
 
-def verify(path: Path, on_progress: Progress | None = None) -> VerifyReport:
+def verify(path: Path, on_progress: OnProgress | None = None) -> VerifyReport:
     """Verify one recording, finished or not.
 
     Raises
@@ -87,7 +87,7 @@ def verify(path: Path, on_progress: Progress | None = None) -> VerifyReport:
 class _Verification:
     """One run over a recording."""
 
-    def __init__(self, path: Path, on_progress: Progress | None) -> None:
+    def __init__(self, path: Path, on_progress: OnProgress | None) -> None:
         self.messages = RecordedMessages(path)
         self.on_progress = on_progress
         self.differences: list[Differs] = []

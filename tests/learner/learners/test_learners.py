@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 import pytest
-from shift_learner.learner import Context, Row, Taken
+from shift_learner.learner import Context, DecisionView, Row
 from shift_learner.learners import LEARNERS, learner_named
 from shift_learner.learners.tabular import Memory, Tabular, greedy
 from shift_model.vocabulary import LearnerName
@@ -46,7 +46,7 @@ def test_functions_of_a_learner_do_not_change_the_old_memory(name: str) -> None:
     where, learner = context(name), LEARNERS[name]
     memory, _ = after_history(learner, where, 10)
     before = json.dumps(learner.dump(memory))
-    taken = Taken(11, 7, where.suggestions[7], 2, 0.5)
+    taken = DecisionView(11, 7, where.suggestions[7], 2, 0.5)
     learner.on_reward(where, learner.on_decision(where, memory, taken), taken, 0.4, None)
     assert json.dumps(learner.dump(memory)) == before
 

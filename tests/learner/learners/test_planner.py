@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import numpy as np
-from shift_learner.learner import Context, Taken
+from shift_learner.learner import Context, DecisionView
 from shift_learner.learners.planner import Memory, Planner
 from shift_study.study import Study
 
@@ -19,7 +19,7 @@ def after_history(context: Context, interactions: int, seed: int = 1) -> Memory:
     for n in range(1, interactions + 1):
         triple = int(rng.integers(30))
         action = int(rng.integers(context.actions))
-        taken = Taken(n, triple, context.suggestions[triple], action, 1.0)
+        taken = DecisionView(n, triple, context.suggestions[triple], action, 1.0)
         memory = PLANNER.on_decision(context, memory, taken)
         memory = PLANNER.on_reward(context, memory, taken, float(rng.choice([-0.5, 0.5])), None)
     return memory
@@ -90,7 +90,7 @@ def test_repeated_failures_turn_the_planner_away_from_a_suggestion() -> None:
     triple = 25  # high, focused, unknown: the suggestion is a plain affirmation
     assert CONTEXT.suggestions[triple] == 0
     for n in range(1, 8):
-        taken = Taken(n, triple, 0, 0, 1.0)
+        taken = DecisionView(n, triple, 0, 0, 1.0)
         memory = PLANNER.on_decision(CONTEXT, memory, taken)
         memory = PLANNER.on_reward(CONTEXT, memory, taken, -0.5, None)
     assert PLANNER.row(CONTEXT, memory, triple).probabilities[0] == 0

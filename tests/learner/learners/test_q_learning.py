@@ -7,7 +7,7 @@ import json
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shift_learner.learner import Context, Taken
+from shift_learner.learner import Context, DecisionView
 from shift_learner.learners.q_learning import Memory, QLearning
 from shift_study.loading import study_of
 
@@ -21,9 +21,9 @@ def context(**given: object) -> Context:
     return Context(study_of({"study": "x", "learner": given}))
 
 
-def taken(state: int, action: int, n: int = 1) -> Taken:
+def taken(state: int, action: int, n: int = 1) -> DecisionView:
     """Return a decision."""
-    return Taken(n=n, triple=0, cognitive_state=state, action=action, propensity=0.5)
+    return DecisionView(n=n, triple=0, cognitive_state=state, action=action, propensity=0.5)
 
 
 def after(known: Context, *actions: int) -> Memory:

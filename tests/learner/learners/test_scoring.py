@@ -4,7 +4,7 @@ import json
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shift_learner.learner import Context, Taken
+from shift_learner.learner import Context, DecisionView
 from shift_learner.learners.scoring import Scoring
 from shift_study.study import Study
 
@@ -17,7 +17,7 @@ def test_scoring_follows_the_suggestion_for_any_rewards(history: list[tuple[int,
     memory = LEARNER.initial(KNOWN)
     visits = [[0] * 6 for _ in range(6)]
     for n, (state, action, reward) in enumerate(history, start=1):
-        taken = Taken(n, 0, state, action, 1.0)
+        taken = DecisionView(n, 0, state, action, 1.0)
         memory = LEARNER.on_reward(KNOWN, LEARNER.on_decision(KNOWN, memory, taken), taken, reward, None)
         visits[state][action] += 1
     for state in range(6):

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shift_model.vocabulary import TRIPLES
 
-from shift_learner.learner import Context, Row, Taken
+from shift_learner.learner import Context, DecisionView, Row
 from shift_learner.learners.largest import chances_of_largest
 
 Floats = NDArray[np.float64]
@@ -55,12 +55,12 @@ class LinearThompson:
         n = context.actions
         return Memory(np.zeros((n, FEATURES, FEATURES)), np.zeros((n, FEATURES)), np.zeros((len(TRIPLES), n), np.int64))
 
-    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+    def on_decision(self, context: Context, memory: Memory, taken: DecisionView) -> Memory:
         """Return the memory unchanged."""
         return memory
 
     def on_reward(
-        self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
+        self, context: Context, memory: Memory, taken: DecisionView, reward: float, following: DecisionView | None
     ) -> Memory:
         """Add one observation to the action's regression."""
         x = features(context, taken.triple)[taken.action]

@@ -19,7 +19,7 @@ import numpy as np
 from shift_model.vocabulary import TRIPLES
 from shift_study.loading import study_json, study_of
 
-from shift_learner.learner import Context, Row, Taken
+from shift_learner.learner import Context, DecisionView, Row
 from shift_learner.learners.planning.engine import (
     Model,
     State,
@@ -70,12 +70,12 @@ class Planner:
         model = _model_of(study_json(context.study))
         return Memory(context, model, initial(model, 1), np.zeros((len(TRIPLES), context.actions), np.int64))
 
-    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+    def on_decision(self, context: Context, memory: Memory, taken: DecisionView) -> Memory:
         """Move capacity and count the gaze class."""
         return _after(_under(context, memory), (taken.triple, taken.action))
 
     def on_reward(
-        self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
+        self, context: Context, memory: Memory, taken: DecisionView, reward: float, following: DecisionView | None
     ) -> Memory:
         """Update the beliefs; a reward above 0 is a success."""
         return _after(_under(context, memory), (taken.triple, taken.action, int(reward > 0)))

@@ -14,7 +14,7 @@ from typing import Any
 
 from shift_model.q_learning import decayed_epsilon, updated_value
 
-from shift_learner.learner import Context, Row, Taken
+from shift_learner.learner import Context, DecisionView, Row
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class QLearning:
             taken=(False,) * n,
         )
 
-    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+    def on_decision(self, context: Context, memory: Memory, taken: DecisionView) -> Memory:
         """Mark the action as taken and count the decision, which lowers epsilon."""
         return replace(
             memory,
@@ -53,7 +53,7 @@ class QLearning:
         )
 
     def on_reward(
-        self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
+        self, context: Context, memory: Memory, taken: DecisionView, reward: float, following: DecisionView | None
     ) -> Memory:
         """Move Q(s, a) by the learning rate towards r + gamma x max Q(s')."""
         settings = context.study.learner

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from shift_learner.learner import Context, Row, Taken
+from shift_learner.learner import Context, DecisionView, Row
 
 Visits = tuple[tuple[int, ...], ...]
 
@@ -22,12 +22,12 @@ class Scoring:
         """Return zero visits."""
         return tuple((0,) * context.actions for _ in context.cognitive_states)
 
-    def on_decision(self, context: Context, memory: Visits, taken: Taken) -> Visits:
+    def on_decision(self, context: Context, memory: Visits, taken: DecisionView) -> Visits:
         """Return the memory unchanged."""
         return memory
 
     def on_reward(
-        self, context: Context, memory: Visits, taken: Taken, reward: float, following: Taken | None
+        self, context: Context, memory: Visits, taken: DecisionView, reward: float, following: DecisionView | None
     ) -> Visits:
         """Count the visit."""
         row = memory[taken.cognitive_state]

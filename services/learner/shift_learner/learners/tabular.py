@@ -10,7 +10,7 @@ from typing import Any
 
 from shift_model.vocabulary import TRIPLES
 
-from shift_learner.learner import Context, Row, Taken
+from shift_learner.learner import Context, DecisionView, Row
 
 Counts = tuple[tuple[int, ...], ...]
 Sums = tuple[tuple[float, ...], ...]
@@ -36,12 +36,12 @@ class Tabular:
         n = context.actions
         return Memory(((0,) * n,) * len(TRIPLES), ((0.0,) * n,) * len(TRIPLES))
 
-    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+    def on_decision(self, context: Context, memory: Memory, taken: DecisionView) -> Memory:
         """Count the decision."""
         return replace(memory, decisions=memory.decisions + 1)
 
     def on_reward(
-        self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
+        self, context: Context, memory: Memory, taken: DecisionView, reward: float, following: DecisionView | None
     ) -> Memory:
         """Count the visit and add its reward."""
         at, action = taken.triple, taken.action

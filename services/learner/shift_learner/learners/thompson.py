@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from shift_model.vocabulary import TRIPLES
 
-from shift_learner.learner import Context, Row, Taken
+from shift_learner.learner import Context, DecisionView, Row
 from shift_learner.learners.largest import chances_of_largest
 
 POINTS = 1025
@@ -43,12 +43,12 @@ class Thompson:
         empty = ((0,) * context.actions,) * len(TRIPLES)
         return Memory(empty, empty)
 
-    def on_decision(self, context: Context, memory: Memory, taken: Taken) -> Memory:
+    def on_decision(self, context: Context, memory: Memory, taken: DecisionView) -> Memory:
         """Return the memory unchanged."""
         return memory
 
     def on_reward(
-        self, context: Context, memory: Memory, taken: Taken, reward: float, following: Taken | None
+        self, context: Context, memory: Memory, taken: DecisionView, reward: float, following: DecisionView | None
     ) -> Memory:
         """Count one success or failure."""
         if reward > 0:
@@ -94,7 +94,7 @@ def _same_state(context: Context, triple: int) -> list[int]:
     return [t for t, action in enumerate(context.suggestions) if action == context.suggestions[triple]]
 
 
-def _add_count(counts: Counts, taken: Taken) -> Counts:
+def _add_count(counts: Counts, taken: DecisionView) -> Counts:
     row = list(counts[taken.triple])
     row[taken.action] += 1
     return (*counts[: taken.triple], tuple(row), *counts[taken.triple + 1 :])

@@ -19,7 +19,7 @@ from shift_schemas.registry import READS
 from shift_recorder import core
 from shift_recorder.core import RecorderState
 from shift_recorder.service.convergence import END_WAIT_S, Convergence
-from shift_recorder.service.ending import SessionEnds
+from shift_recorder.service.ending import SessionEndProtocol
 from shift_recorder.service.segment_sink import SegmentSink
 from shift_recorder.service.session_commands import SessionCommands
 from shift_recorder.service.stray_messages import StrayMessages
@@ -41,7 +41,7 @@ def extend(worker: Worker[RecorderState], settings: MeshSettings) -> Extension:
         worker.metrics, worker.transactions.close_session,
     )  # fmt: skip
     convergence = Convergence(worker.reader, worker.progress)
-    ends = SessionEnds(
+    ends = SessionEndProtocol(
         data / "recordings", worker.states, worker.journal, worker.progress, worker.alarm, sink, convergence,
         worker.tasks, worker.enqueue,
     )  # fmt: skip

@@ -38,7 +38,7 @@ Enqueue = Callable[[PendingRequest | Callable[[], None]], None]
 """Puts a request or a function before the worker, behind everything that has arrived."""
 
 
-class SessionEnds:
+class SessionEndProtocol:
     """The recorder's end protocol. The recordings of several sessions may be finished at the same time."""
 
     def __init__(

@@ -32,7 +32,7 @@ class EndProtocol(Protocol):
         """Begin the second halves of what is committed now. It is called after every turn that was not undone."""
 
 
-class NoEnds:
+class NoEndProtocol:
     """The end protocol of a service whose commands all have one half."""
 
     def takes(self, request: PendingRequest) -> bool:

@@ -38,7 +38,7 @@ from shift_runtime.service.core import Core
 from shift_runtime.service.core_sink import CoreSink
 from shift_runtime.service.disk_alarm import DiskAlarm
 from shift_runtime.service.endpoints import ServiceEndpoints
-from shift_runtime.service.extension import Extension, NoEnds
+from shift_runtime.service.extension import Extension, NoEndProtocol
 from shift_runtime.service.notifications import Notifications
 from shift_runtime.service.progress import Progress
 from shift_runtime.service.requests import PendingRequest, Requests
@@ -100,7 +100,7 @@ class Worker(Generic[S]):
         sink = CoreSink(
             self.core, self.states, self.progress, self.transactions, self.waiting, self.clock, self.metrics
         )
-        return Extension(sink, NoEnds(), self._prepare)
+        return Extension(sink, NoEndProtocol(), self._prepare)
 
     def _prepare(self, session: str, message: Any) -> Any:
         return self.core.prepare(message, partial(self.transactions.recall, session))
