@@ -200,6 +200,16 @@ def test_report_waits_for_the_configuration_that_was_answered_before_it() -> Non
     assert core.step(state, report(1, config=2), NOW, timed_out=True).facts
 
 
+def test_correction_waits_for_the_configuration_that_was_answered_before_it() -> None:
+    state, _ = folded(session(), config(), decision(1), report(1))
+    with pytest.raises(InputsMissing) as waiting:
+        core.step(state, correction(1, understood=False, config=2), NOW)
+    assert waiting.value.owners == ("recorder",)
+    paused = core.step(state, config(2, paused=True), NOW).state
+    facts = core.step(paused, correction(1, understood=False, config=2), NOW).facts
+    assert not [f for f in facts if isinstance(f, Transition)], "the learner is paused"
+
+
 def test_report_without_a_session_or_after_its_end_is_refused() -> None:
     with pytest.raises(UnknownThing):
         core.step(None, report(1), NOW)
@@ -389,9 +399,11 @@ def test_refused_command_changes_no_state(history: list[Any]) -> None:
 # --- corrections ---
 
 
-def correction(n: int, understood: bool = True, able: bool = True, seconds: float = 5.0) -> ReportPerformance:
+def correction(
+    n: int, understood: bool = True, able: bool = True, seconds: float = 5.0, **need: int
+) -> ReportPerformance:
     """Return a correction of the report of the ``n``-th decision."""
-    changed = report(n, understood, able, seconds)
+    changed = report(n, understood, able, seconds, **need)
     return changed.model_copy(update={"command_id": f"c-{n}", "corrects": f"d{n}"})
 
 

@@ -108,9 +108,9 @@ def _taken(context: Context, decision: Decision) -> DecisionView:
 
 def _on_report(state: LearnerState, command: ReportPerformance, now: Stamp, timed_out: bool) -> Step[LearnerState]:
     check_accepts(state.session, state.phase, command)
-    if command.corrects is not None and command.corrects in state.reported:
-        return _on_correction(state, command, now)
     check_known(state, command, timed_out)
+    if command.corrects is not None:
+        return _on_correction(state, command, now)
     decision_id = command.decision_id
     if decision_id in state.rewards:
         raise Conflict(f"decision {decision_id} has its performance already")

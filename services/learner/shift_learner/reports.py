@@ -40,6 +40,8 @@ def check_known(state: LearnerState, command: ReportPerformance, timed_out: bool
         raise InputsMissing(behind, WAIT_S)
     if state.config is None or state.decisions < command.need.decision:
         raise Unavailable(f"the learner has not heard all of the {' and the '.join(behind)} yet")
+    if command.corrects is not None and command.corrects in state.reported:
+        return
     if command.corrects is not None and command.decision_id not in state.open:
         raise UnknownThing(
             f"session {state.session} has no report of decision {command.corrects} that can be corrected; "
@@ -106,7 +108,8 @@ def without_report(state: LearnerState, decision_id: str) -> LearnerState:
 def _owners_behind(state: LearnerState, command: ReportPerformance) -> tuple[str, ...]:
     """Return the owners whose facts the report needs and the learner has not read."""
     config_missing = state.config is None or state.config.version < command.need.config
-    decision_missing = command.decision_id not in state.open or state.decisions < command.need.decision
+    known = command.decision_id in state.open or command.corrects in state.reported
+    decision_missing = not known or state.decisions < command.need.decision
     lacking = (("recorder", config_missing), ("decider", decision_missing))
     return tuple(owner for owner, missing in lacking if missing)
 
