@@ -7,6 +7,7 @@ cut of chunks changes the result. Targets are indices of the study's AOIs; ``NOW
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from shift_model import attention as equations
@@ -51,10 +52,10 @@ def initial_attention(aois: int) -> Attention:
     return Attention(uniform_weights(aois))
 
 
-def apply_dwell(
-    attention: Attention, dwell: Dwell, hold_ns: int, gap_ns: int, settings: AttentionSettings
+def apply_dwells(
+    attention: Attention, dwells: Iterable[Dwell], hold_ns: int, gap_ns: int, settings: AttentionSettings
 ) -> Attention:
-    """Return the attention after a dwell: weights, held target and focus shift.
+    """Return the attention after dwells, one after another: weights, held target and focus shift.
 
     Parameters
     ----------
@@ -62,27 +63,35 @@ def apply_dwell(
         Another target becomes the held one when gaze has been on it for this long without a break, that is without
         dwell on anything else and without a pause longer than ``gap_ns``. The time beyond counts as held.
     """
-    target, start_ns, duration_ns = dwell.target, dwell.start_ns, dwell.duration_ns
-    unbroken = (
-        target == attention.run_target and attention.until_ns is not None and start_ns - attention.until_ns <= gap_ns
-    )
-    run_ns = (attention.run_ns if unbroken else 0) + duration_ns
-    held, shift, held_ns = attention.held, attention.focus_shift, duration_ns
-    if target != held:
-        held_ns = run_ns - hold_ns
-        if held_ns >= 0:
-            shift = _shift_after_change(shift, held, settings)
-            held = target
-    weights, dwell_ns = attention.weights, attention.dwell_ns
-    if target != NOWHERE:
-        dwell_ns += duration_ns
-        applications = duration_ns / NS / settings.step_s
-        weights = next_weights(weights, target, settings.weight_step * applications, settings.weight_min)
-        if target == held:
-            shift = lowered_focus_shift(shift, settings.shift_decrease * (held_ns / NS / settings.step_s))
-    return Attention(
-        weights, shift, held, target, min(run_ns, hold_ns), start_ns + duration_ns, attention.aoi_seen, dwell_ns
-    )  # fmt: skip
+    weights, shift, held, run_target, run_ns, until_ns, aoi_seen, dwell_ns = attention
+    step_s, weight_step, weight_min = settings.step_s, settings.weight_step, settings.weight_min
+    decrease = settings.shift_decrease
+    for target, start_ns, duration_ns in dwells:
+        if target != run_target or until_ns is None or start_ns - until_ns > gap_ns:
+            run_ns = 0
+        run_ns += duration_ns
+        held_ns = duration_ns
+        if target != held:
+            held_ns = run_ns - hold_ns
+            if held_ns >= 0:
+                shift = _shift_after_change(shift, held, settings)
+                held = target
+        if target != NOWHERE:
+            dwell_ns += duration_ns
+            weights = next_weights(weights, target, weight_step * (duration_ns / NS / step_s), weight_min)
+            if target == held:
+                shift = lowered_focus_shift(shift, decrease * (held_ns / NS / step_s))
+        run_target, until_ns = target, start_ns + duration_ns
+        if run_ns > hold_ns:
+            run_ns = hold_ns
+    return Attention(weights, shift, held, run_target, run_ns, until_ns, aoi_seen, dwell_ns)
+
+
+def apply_dwell(
+    attention: Attention, dwell: Dwell, hold_ns: int, gap_ns: int, settings: AttentionSettings
+) -> Attention:
+    """Return the attention after one dwell; see :func:`apply_dwells`."""
+    return apply_dwells(attention, (dwell,), hold_ns, gap_ns, settings)
 
 
 def gaze_class(attention: Attention, settings: AttentionSettings) -> GazeClass:

@@ -3,17 +3,21 @@
 The detector reads one sample after another; times are integer nanoseconds on the source's clock. A sample stands for
 the time until the next one, at most ``maximum_gap_s``. Time that no valid sample stands for is a gap; a gap longer
 than ``maximum_gap_s`` ends a fixation. An open fixation keeps running sums instead of its samples.
+
+A step reads all samples of a chunk. Inside it the filter and the search change in place, since a new value for each
+sample costs more than the arithmetic; between two steps there are only the frozen values of this module.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import atan, degrees
 from typing import NamedTuple
 
 from shift_schemas.timestamps import NS
 from shift_study.constants import FixationSettings
 
-from shift_monitor.median import EMPTY, MedianWindow, Point, flush, pop_ready, push, set_duration
+from shift_monitor.median import EMPTY, MedianFilter, MedianWindow, Point
 
 LONGEST_CANDIDATE = 1024
 """Chosen: the most samples that wait to become a fixation, 0.06 s at 17 kHz; beyond, the oldest are dropped."""
@@ -72,7 +76,7 @@ class EndedFixation(NamedTuple):
 
 
 class FixationUpdate(NamedTuple):
-    """The result of one sample: the samples inside a fixation, in order, and the fixations that ended."""
+    """The result of some samples: those inside a fixation, in order, and the fixations that ended."""
 
     dwells: list[Point]
     found: list[EndedFixation]
@@ -91,34 +95,33 @@ def rule_of(settings: FixationSettings) -> FixationRule:
 
 
 def update(
-    detector: Detector, t_ns: int, point: tuple[float, float] | None, rule: FixationRule
+    detector: Detector, samples: Iterable[tuple[int, tuple[float, float] | None]], rule: FixationRule
 ) -> tuple[Detector, FixationUpdate]:
-    """Return the detector after one more sample, and the sample's result.
+    """Return the detector after further samples, and their result.
 
     Parameters
     ----------
-    t_ns
-        The sample's time; it is later than the time of every sample before.
-    point
-        The position on the stimulus (0..1), or None for a lost sample.
+    samples
+        The time of each sample and its position on the stimulus (0..1), or None for a lost sample. The times rise, and
+        are later than those of all samples before.
     """
-    output = FixationUpdate([], [])
-    filter, covered_ns = detector.filter, detector.covered_ns
-    if covered_ns is None and detector.last_ns is not None and filter.points:
-        duration_ns = min(t_ns - detector.last_ns, rule.gap_ns)
-        covered_ns = detector.last_ns + duration_ns
-        filter = set_duration(filter, duration_ns)
-    candidate, open_ = detector.candidate, detector.open
-    if covered_ns is not None and t_ns - covered_ns > rule.gap_ns:
-        _finish(filter, candidate, open_, rule, output)
-        filter, candidate, open_ = EMPTY, (), None
-    if point is not None:
-        filter = push(filter, (t_ns, *point, 0))
-        covered_ns = None
-    filter, ready = pop_ready(filter, t_ns, rule.half_filter_ns)
-    for filtered in ready:
-        candidate, open_ = _detect(candidate, open_, filtered, rule, output)
-    return Detector(t_ns, covered_ns, filter, candidate, open_), output
+    last_ns, covered_ns, gap_ns = detector.last_ns, detector.covered_ns, rule.gap_ns
+    filter = MedianFilter(detector.filter, rule.half_filter_ns)
+    search = _Search(detector, rule)
+    for t_ns, point in samples:
+        if covered_ns is None and last_ns is not None and not filter.empty:
+            duration_ns = min(t_ns - last_ns, gap_ns)
+            covered_ns = last_ns + duration_ns
+            filter.set_duration(duration_ns)
+        if covered_ns is not None and t_ns - covered_ns > gap_ns:
+            search.end(filter.flush())
+        if point is not None:
+            filter.push(t_ns, *point)
+            covered_ns = None
+        for filtered in filter.pop_ready(t_ns):
+            search.add(filtered)
+        last_ns = t_ns
+    return Detector(last_ns, covered_ns, filter.window, tuple(search.candidate), search.open), search.result
 
 
 def finish(detector: Detector, rule: FixationRule) -> FixationUpdate:
@@ -126,9 +129,9 @@ def finish(detector: Detector, rule: FixationRule) -> FixationUpdate:
 
     An open fixation ends. The last sample has no dwell.
     """
-    output = FixationUpdate([], [])
-    _finish(detector.filter, detector.candidate, detector.open, rule, output)
-    return output
+    search = _Search(detector, rule)
+    search.end(MedianFilter(detector.filter, rule.half_filter_ns).flush())
+    return search.result
 
 
 def dispersion_deg(left: float, right: float, top: float, bottom: float, rule: FixationRule) -> float:
@@ -142,68 +145,74 @@ def dispersion_deg(left: float, right: float, top: float, bottom: float, rule: F
     return degrees(horizontal + vertical)
 
 
-def _finish(
-    filter: MedianWindow,
-    candidate: tuple[Point, ...],
-    open_: OpenFixation | None,
-    rule: FixationRule,
-    output: FixationUpdate,
-) -> None:
-    for filtered in flush(filter, rule.half_filter_ns):
-        candidate, open_ = _detect(candidate, open_, filtered, rule, output)
-    if open_ is not None:
-        output.found.append(_close(open_))
+class _Search:
+    """I-DT over filtered samples while one step runs; it changes in place."""
 
+    __slots__ = ("_checked", "_rule", "candidate", "open", "result")
 
-def _detect(
-    candidate: tuple[Point, ...], open_: OpenFixation | None, point: Point, rule: FixationRule, output: FixationUpdate
-) -> tuple[tuple[Point, ...], OpenFixation | None]:
-    """Make one step of I-DT with a filtered sample."""
-    if open_ is not None:
-        longer = _extend(open_, point)
-        if _is_small(longer, rule):
-            output.dwells.append(point)
-            return (), longer
-        output.found.append(_close(open_))
-    return _search((*candidate, point)[-LONGEST_CANDIDATE:], rule, output)
+    def __init__(self, detector: Detector, rule: FixationRule) -> None:
+        self.candidate = list(detector.candidate)
+        self.open = detector.open
+        self.result = FixationUpdate([], [])
+        self._rule = rule
+        self._checked = False
+        """Whether the open fixation is known to be small by this rule."""
 
+    def add(self, point: Point) -> None:
+        """Read one more filtered sample."""
+        if (open_ := self.open) is not None:
+            longer = _extend(open_, point)
+            if (self._checked and longer[5:] == open_[5:]) or _is_small(*longer[5:], self._rule):
+                self.open, self._checked = longer, True
+                self.result.dwells.append(point)
+                return
+            self._close(open_)
+        self.candidate.append(point)
+        if len(self.candidate) > LONGEST_CANDIDATE:
+            del self.candidate[0]
+        self._look()
 
-def _search(
-    candidate: tuple[Point, ...], rule: FixationRule, output: FixationUpdate
-) -> tuple[tuple[Point, ...], OpenFixation | None]:
-    """Open a fixation where the window that covers the minimum duration is small; else drop its first sample.
+    def end(self, points: list[Point]) -> None:
+        """Read the last samples before a gap or before the end; an open fixation ends."""
+        for point in points:
+            self.add(point)
+        if self.open is not None:
+            self._close(self.open)
+        self.candidate = []
 
-    Chosen: a fixation has at least two samples, since a single one says nothing about dispersion.
-    """
-    while len(candidate) > 1 and candidate[-1][0] + candidate[-1][3] - candidate[0][0] >= rule.minimum_ns:
-        found = _open(candidate)
-        if _is_small(found, rule):
-            output.dwells.extend(candidate)
-            return (), found
-        candidate = candidate[1:]
-    return candidate, None
+    def _close(self, open_: OpenFixation) -> None:
+        self.result.found.append(
+            EndedFixation(open_.start_ns, open_.end_ns, open_.sum_x / open_.samples, open_.sum_y / open_.samples)
+        )
+        self.open = None
 
+    def _look(self) -> None:
+        """Open a fixation where the window that covers the minimum duration is small; else drop its first sample.
 
-def _open(points: tuple[Point, ...]) -> OpenFixation:
-    xs, ys = [p[1] for p in points], [p[2] for p in points]
-    end_ns = points[-1][0] + points[-1][3]
-    return OpenFixation(
-        points[0][0], end_ns, len(points), sum(xs), sum(ys), min(xs), max(xs), min(ys), max(ys)
-    )  # fmt: skip
+        Chosen: a fixation has at least two samples, since a single one says nothing about dispersion.
+        """
+        points, rule = self.candidate, self._rule
+        end_ns = points[-1][0] + points[-1][3]
+        while len(points) > 1 and end_ns - points[0][0] >= rule.minimum_ns:
+            _, xs, ys, _ = zip(*points, strict=True)
+            bounds = min(xs), max(xs), min(ys), max(ys)
+            if _is_small(*bounds, rule):
+                self.open = OpenFixation(points[0][0], end_ns, len(points), sum(xs), sum(ys), *bounds)
+                self._checked = True
+                self.result.dwells.extend(points)
+                self.candidate = []
+                return
+            del points[0]
 
 
 def _extend(o: OpenFixation, point: Point) -> OpenFixation:
+    start_ns, _, samples, sum_x, sum_y, left, right, top, bottom = o
     t_ns, x, y, duration_ns = point
     return OpenFixation(
-        o.start_ns, t_ns + duration_ns, o.samples + 1, o.sum_x + x, o.sum_y + y,
-        x if x < o.left else o.left, x if x > o.right else o.right,
-        y if y < o.top else o.top, y if y > o.bottom else o.bottom,
+        start_ns, t_ns + duration_ns, samples + 1, sum_x + x, sum_y + y,
+        x if x < left else left, x if x > right else right, y if y < top else top, y if y > bottom else bottom,
     )  # fmt: skip
 
 
-def _is_small(o: OpenFixation, rule: FixationRule) -> bool:
-    return dispersion_deg(o.left, o.right, o.top, o.bottom, rule) <= rule.dispersion_deg
-
-
-def _close(o: OpenFixation) -> EndedFixation:
-    return EndedFixation(o.start_ns, o.end_ns, o.sum_x / o.samples, o.sum_y / o.samples)
+def _is_small(left: float, right: float, top: float, bottom: float, rule: FixationRule) -> bool:
+    return dispersion_deg(left, right, top, bottom, rule) <= rule.dispersion_deg

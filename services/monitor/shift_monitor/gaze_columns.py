@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 from shift_schemas.messages import Gaze, GazeChunk
 
 
-def points_of(chunk: GazeChunk) -> Iterator[tuple[float, float] | None]:
-    """Yield the points of a chunk, None for a lost sample. Without ``valid``, a sample that has x and y is valid."""
-    valid: list[bool] = chunk.valid if chunk.valid is not None else [True] * len(chunk.t)
-    for x, y, ok in zip(chunk.x or [], chunk.y or [], valid, strict=True):
-        yield (x, y) if ok and x is not None and y is not None else None
+def points_of(chunk: GazeChunk) -> list[tuple[float, float] | None]:
+    """Return the points of a chunk, None for a lost sample. Without ``valid``, a sample that has x and y is valid."""
+    xs, ys = chunk.x or [], chunk.y or []
+    if chunk.valid is None:
+        return [(x, y) if x is not None and y is not None else None for x, y in zip(xs, ys, strict=True)]
+    return [
+        (x, y) if ok and x is not None and y is not None else None
+        for x, y, ok in zip(xs, ys, chunk.valid, strict=True)
+    ]  # fmt: skip
 
 
 def recorded_columns(chunk: GazeChunk) -> dict[str, list[Any]]:
@@ -22,7 +25,7 @@ def recorded_columns(chunk: GazeChunk) -> dict[str, list[Any]]:
     """
     if chunk.aoi is not None:
         return {"aoi": [name or "" for name in chunk.aoi]}
-    points = list(points_of(chunk))
+    points = points_of(chunk)
     return {
         "x": [p[0] if p else 0.0 for p in points],
         "y": [p[1] if p else 0.0 for p in points],

@@ -1,16 +1,17 @@
 """The samples of one gaze source, points or AOI names, applied to the partner's attention. Pure.
 
-Samples are applied one after another, so the cut of chunks does not change the result.
+The result is that of the samples one after another, so the cut of chunks does not change it.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import repeat
 
 from shift_schemas.messages import GazeChunk
 
 from shift_monitor.areas import NOWHERE, area_at
-from shift_monitor.attention import Attention, Dwell, apply_dwell, mark_aoi_seen
+from shift_monitor.attention import Attention, Dwell, apply_dwells, mark_aoi_seen
 from shift_monitor.chunk_sequence import ChunkSequence
 from shift_monitor.fixation import Detector, EndedFixation, FixationUpdate, update
 from shift_monitor.gaze_account import (
@@ -51,19 +52,16 @@ def apply_points(
     stream: GazeStream, attention: Attention, times: list[int], chunk: GazeChunk, prepared: PreparedStudy
 ) -> tuple[GazeStream, Attention, list[EndedFixation]]:
     """Apply points through fixation detection; only samples inside a fixation count as dwell."""
-    found: list[EndedFixation] = []
-    detector, account = stream.detector, stream.account
-    kinds: list[int] = []
-    for t_ns, point in zip(times, points_of(chunk), strict=True):
-        kinds.append(_kind(point))
-        if not attention.aoi_seen and point is not None and area_at(prepared.areas, *point) != NOWHERE:
-            attention = mark_aoi_seen(attention)
-        detector, output = update(detector, t_ns, point, prepared.rule)
-        if output.dwells:
-            attention, account = apply_fixation_dwell(attention, account, output, prepared)
-        found += output.found
-    account = count_samples(account, times, kinds, prepared.rule.gap_ns)
-    return replace(stream, last_ns=times[-1], named=None, detector=detector, account=account), attention, found
+    points, areas = points_of(chunk), prepared.areas
+    if not attention.aoi_seen and any(p is not None and area_at(areas, *p) != NOWHERE for p in points):
+        attention = mark_aoi_seen(attention)
+    detector, output = update(stream.detector, zip(times, points, strict=True), prepared.rule)
+    attention, account = apply_fixation_dwell(attention, stream.account, output, prepared)
+    account = count_samples(account, times, map(_kind, points), prepared.rule.gap_ns)
+    after = GazeStream(
+        stream.source, stream.numbering, times[-1], None, detector, stream.segment, account, stream.spacings
+    )
+    return after, attention, output.found
 
 
 def _kind(point: tuple[float, float] | None) -> int:
@@ -76,35 +74,35 @@ def apply_fixation_dwell(
     attention: Attention, account: GazeAccount, output: FixationUpdate, prepared: PreparedStudy
 ) -> tuple[Attention, GazeAccount]:
     """Apply the dwell of the samples inside a fixation, each on the AOI at its filtered position."""
-    rule, settings = prepared.rule, prepared.study.attention
-    on_aoi_ns = off_aoi_ns = 0
-    for t_ns, x, y, duration_ns in output.dwells:
-        target = area_at(prepared.areas, x, y)
-        if target == NOWHERE:
-            off_aoi_ns += duration_ns
-        else:
-            on_aoi_ns += duration_ns
-        attention = apply_dwell(attention, Dwell(target, t_ns, duration_ns), rule.minimum_ns, rule.gap_ns, settings)
-    return attention, count_dwell(account, on_aoi_ns, off_aoi_ns)
+    rule, areas = prepared.rule, prepared.areas
+    dwells = [Dwell(area_at(areas, x, y), t_ns, duration_ns) for t_ns, x, y, duration_ns in output.dwells]
+    return _apply(dwells, attention, account, prepared, gap_ns=rule.gap_ns)
 
 
 def apply_names(
     stream: GazeStream, attention: Attention, times: list[int], names: list[str | None], prepared: PreparedStudy
 ) -> tuple[GazeStream, Attention]:
     """Apply AOI names; each stands until the next one, at most ``attention.maximum_dwell_s``."""
-    last_ns, named = stream.last_ns, stream.named
-    on_aoi_ns = off_aoi_ns = 0
+    last_ns, named, longest_ns = stream.last_ns, stream.named, prepared.longest_ns
+    dwells: list[Dwell] = []
     for t_ns, name in zip(times, names, strict=True):
         if last_ns is not None and named is not None:
-            dwell = Dwell(named, last_ns, min(t_ns - last_ns, prepared.longest_ns))
-            if named == NOWHERE:
-                off_aoi_ns += dwell.duration_ns
-            else:
-                on_aoi_ns += dwell.duration_ns
-            attention = apply_dwell(attention, dwell, prepared.rule.minimum_ns, 0, prepared.study.attention)
+            dwells.append(Dwell(named, last_ns, min(t_ns - last_ns, longest_ns)))
         last_ns, named = t_ns, prepared.targets[name]
         if not attention.aoi_seen and named != NOWHERE:
             attention = mark_aoi_seen(attention)
-    account = count_samples(stream.account, times, [ON_STIMULUS] * len(times), prepared.longest_ns)
-    account = count_dwell(account, on_aoi_ns, off_aoi_ns)
+    attention, account = _apply(dwells, attention, stream.account, prepared, gap_ns=0)
+    account = count_samples(account, times, repeat(ON_STIMULUS, len(times)), longest_ns)
     return replace(stream, last_ns=last_ns, named=named, account=account), attention
+
+
+def _apply(
+    dwells: list[Dwell], attention: Attention, account: GazeAccount, prepared: PreparedStudy, gap_ns: int
+) -> tuple[Attention, GazeAccount]:
+    """Apply dwells to the attention, and count them."""
+    if not dwells:
+        return attention, account
+    total_ns = sum([d.duration_ns for d in dwells])
+    off_aoi_ns = sum([d.duration_ns for d in dwells if d.target == NOWHERE])
+    after = apply_dwells(attention, dwells, prepared.rule.minimum_ns, gap_ns, prepared.study.attention)
+    return after, count_dwell(account, total_ns - off_aoi_ns, off_aoi_ns)

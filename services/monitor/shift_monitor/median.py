@@ -27,55 +27,82 @@ class MedianWindow(NamedTuple):
 EMPTY = MedianWindow()
 
 
-def push(filter: MedianWindow, point: Point) -> MedianWindow:
-    """Return the filter with one more sample, which waits."""
-    return MedianWindow((*filter.points, point), filter.waiting + 1)
+class MedianFilter:
+    """The filter while one step runs. It changes in place; :attr:`window` is its state between two steps."""
+
+    __slots__ = ("_half_ns", "_points", "_waiting")
+
+    def __init__(self, window: MedianWindow, half_ns: int) -> None:
+        self._points = list(window.points)
+        self._waiting = window.waiting
+        self._half_ns = half_ns
+
+    @property
+    def window(self) -> MedianWindow:
+        """The samples within reach."""
+        return MedianWindow(tuple(self._points), self._waiting)
+
+    @property
+    def empty(self) -> bool:
+        """Whether no sample is within reach."""
+        return not self._points
+
+    def push(self, t_ns: int, x: float, y: float) -> None:
+        """Add a sample, which waits. The duration that it stands for is known once the next sample is there."""
+        self._points.append((t_ns, x, y, 0))
+        self._waiting += 1
+
+    def set_duration(self, duration_ns: int) -> None:
+        """Set the duration that the newest sample stands for."""
+        t_ns, x, y, _ = self._points[-1]
+        self._points[-1] = (t_ns, x, y, duration_ns)
+
+    def pop_ready(self, now_ns: int) -> list[Point]:
+        """Return the filtered samples that no sample from ``now_ns`` on can change."""
+        points, half_ns, waiting = self._points, self._half_ns, self._waiting
+        ready = []
+        while waiting and (points[-waiting][0] + half_ns < now_ns or len(points) > LONGEST_WINDOW):
+            ready.append(_filtered(points, len(points) - waiting, half_ns))
+            waiting -= 1
+            _forget(points, waiting, now_ns - half_ns, half_ns)
+        self._waiting = waiting
+        return ready
+
+    def flush(self) -> list[Point]:
+        """Return all samples that still wait, filtered, when no sample follows; the filter is empty afterwards."""
+        points = self._points
+        ready = [_filtered(points, i, self._half_ns) for i in range(len(points) - self._waiting, len(points))]
+        self._points, self._waiting = [], 0
+        return ready
 
 
-def set_duration(filter: MedianWindow, duration_ns: int) -> MedianWindow:
-    """Return the filter with the duration of its newest sample, which is known once the next sample is there."""
-    t_ns, x, y, _ = filter.points[-1]
-    return MedianWindow((*filter.points[:-1], (t_ns, x, y, duration_ns)), filter.waiting)
-
-
-def pop_ready(filter: MedianWindow, now_ns: int, half_ns: int) -> tuple[MedianWindow, list[Point]]:
-    """Return the rest of the filter, and the filtered samples that no sample from ``now_ns`` on can change."""
-    points, waiting, ready = filter.points, filter.waiting, []
-    while waiting and (points[-waiting][0] + half_ns < now_ns or len(points) > LONGEST_WINDOW):
-        ready.append(_filtered(points, len(points) - waiting, half_ns))
-        waiting -= 1
-        points = _within_reach(points, waiting, now_ns - half_ns, half_ns)
-    return (MedianWindow(points, waiting), ready) if ready else (filter, ready)
-
-
-def flush(filter: MedianWindow, half_ns: int) -> list[Point]:
-    """Return all samples that still wait, filtered, when no sample follows."""
-    points = filter.points
-    return [_filtered(points, i, half_ns) for i in range(len(points) - filter.waiting, len(points))]
-
-
-def _filtered(points: tuple[Point, ...], i: int, half_ns: int) -> Point:
-    t_ns, _, _, duration_ns = points[i]
+def _filtered(points: list[Point], i: int, half_ns: int) -> Point:
+    t_ns, x, y, duration_ns = points[i]
     first, end = 0, len(points)
-    while points[first][0] < t_ns - half_ns:
+    since_ns, until_ns = t_ns - half_ns, t_ns + half_ns
+    while points[first][0] < since_ns:
         first += 1
-    while points[end - 1][0] > t_ns + half_ns:
+    while points[end - 1][0] > until_ns:
         end -= 1
-    around = points[first:end]
-    return t_ns, _median([p[1] for p in around]), _median([p[2] for p in around]), duration_ns
+    count = end - first
+    if count == 1:
+        return t_ns, x, y, duration_ns
+    _, xs, ys, _ = zip(*points[first:end], strict=True)
+    ordered_x, ordered_y, middle = sorted(xs), sorted(ys), count // 2
+    if count % 2:
+        return t_ns, ordered_x[middle], ordered_y[middle], duration_ns
+    x = (ordered_x[middle - 1] + ordered_x[middle]) / 2
+    y = (ordered_y[middle - 1] + ordered_y[middle]) / 2
+    return t_ns, x, y, duration_ns
 
 
-def _median(values: list[float]) -> float:
-    values.sort()
-    middle = len(values) // 2
-    return values[middle] if len(values) % 2 else (values[middle - 1] + values[middle]) / 2
-
-
-def _within_reach(points: tuple[Point, ...], waiting: int, since_ns: int, half_ns: int) -> tuple[Point, ...]:
-    """Return the points without those that are too old for the next filtered sample and for all that follow it."""
+def _forget(points: list[Point], waiting: int, since_ns: int, half_ns: int) -> None:
+    """Remove the samples that are too old for the next filtered sample and for all that follow it."""
     if waiting:
         since_ns = min(since_ns, points[-waiting][0] - half_ns)
-    first = 0
-    while first < len(points) - waiting and points[first][0] < since_ns:
+    first, filtered = 0, len(points) - waiting
+    while first < filtered and points[first][0] < since_ns:
         first += 1
-    return points[first:][-LONGEST_WINDOW:]
+    first = max(first, len(points) - LONGEST_WINDOW)
+    if first:
+        del points[:first]
