@@ -10,12 +10,15 @@ from shift_schemas.registry import READS
 
 from shift_monitor import core
 from shift_monitor.core import MonitorState
-from shift_monitor.gaze_input import gaze_input
+from shift_monitor.gaze_input import ChunkWithHistory, gaze_input
+from shift_monitor.state import may_be_used
 
 
-def prepared(message: Any, recall: Recall) -> Any:
-    """Return a chunk of gaze together with the fact that was recorded under its number before."""
-    return gaze_input(message, recall) if isinstance(message, GazeChunk) else message
+def prepared(state: MonitorState | None, message: Any, recall: Recall) -> Any:
+    """Return a chunk of gaze together with what was recorded under its number before, if its number may be used."""
+    if not isinstance(message, GazeChunk):
+        return message
+    return gaze_input(message, recall) if may_be_used(state, message) else ChunkWithHistory(message)
 
 
 CORE: Core[MonitorState] = Core(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pydantic import TypeAdapter
 from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Unavailable
-from shift_schemas.messages import Session
+from shift_schemas.messages import GazeChunk, Session
 from shift_schemas.timestamps import Stamp
 
 from shift_monitor.attention import Attention
@@ -69,6 +69,19 @@ def dump(state: MonitorState) -> str:
 def load(text: str) -> MonitorState:
     """Return the state that :func:`dump` wrote."""
     return _STATE.validate_json(text)
+
+
+def may_be_used(state: MonitorState | None, chunk: GazeChunk) -> bool:
+    """Return whether something may be recorded under a chunk's number; without it nothing has to be looked up.
+
+    In the first segment of a source every recorded number is at most the last one.
+    """
+    if state is None:
+        return False
+    stream = state.stream
+    if stream is None or stream.source != chunk.source:
+        return chunk.source in state.former
+    return stream.segment > 0 or chunk.seq <= stream.numbering.last
 
 
 def study_in_force(state: MonitorState, timed_out: bool) -> PreparedStudy:

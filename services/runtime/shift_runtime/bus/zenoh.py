@@ -52,36 +52,54 @@ def direct(handle: Callable[[T], None], drop: Callable[[], None] | None = None) 
     return Callback(run, drop, indirect=False)
 
 
+@dataclass
+class _Lane:
+    """One handler, and how many of its items wait."""
+
+    handle: Callable[[Any], None]
+    limit: int
+    waiting: int = 0
+
+
 class _Gate:
-    """Passes items from Zenoh's threads to the loop. While ``limit`` items wait, others are dropped and counted."""
+    """Passes items from Zenoh's threads to the loop. A burst wakes the loop once; the order of all items is kept.
+
+    While as many items of a handler wait as its ``limit``, further ones are dropped and counted.
+    """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
         self._lock = threading.Lock()
+        self._items: list[tuple[_Lane, Any]] = []
         self.dropped = 0
 
     def handler(self, handle: Callable[[T], None], limit: int) -> Callable[[T], None]:
-        waiting = 0
-
-        def run(item: T) -> None:
-            nonlocal waiting
-            with self._lock:
-                waiting -= 1
-            handle(item)
+        lane = _Lane(handle, limit)
 
         def enqueue(item: T) -> None:
-            nonlocal waiting
             with self._lock:
-                if waiting >= limit:
+                if lane.waiting >= lane.limit:
                     self.dropped += 1
                     return
-                waiting += 1
-            try:
-                self._loop.call_soon_threadsafe(run, item)
-            except RuntimeError:  # the loop is closed: the process is ending
-                return
+                lane.waiting += 1
+                self._items.append((lane, item))
+                if len(self._items) > 1:
+                    return  # the loop is woken already
+            with contextlib.suppress(RuntimeError):  # the loop is closed: the process is ending
+                self._loop.call_soon_threadsafe(self._hand_over)
 
         return enqueue
+
+    def _hand_over(self) -> None:
+        with self._lock:
+            items, self._items = self._items, []
+            for lane, _ in items:
+                lane.waiting -= 1
+        for lane, item in items:
+            try:
+                lane.handle(item)
+            except Exception as e:  # the items behind it are handled all the same
+                self._loop.call_exception_handler({"message": "a handler of messages failed", "exception": e})
 
 
 @dataclass

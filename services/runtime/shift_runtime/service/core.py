@@ -36,7 +36,7 @@ class Core(Generic[S]):
     dump: Callable[[S], str]
     load: Callable[[str], S]
     reads: Mapping[str, frozenset[str]]
-    prepare: Callable[[Any, Recall], Any] = lambda message, recall: message
-    """Turns a request's message into what the core steps on, given the facts that were recorded before."""
+    prepare: Callable[[S | None, Any, Recall], Any] = lambda state, message, recall: message
+    """Turns a request's message into what the core steps on, given the state and the facts recorded before."""
     lookups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """By subject of its own, the fields by which ``recall`` finds facts."""

@@ -103,7 +103,7 @@ class Worker(Generic[S]):
         return Extension(sink, NoEndProtocol(), self._prepare)
 
     def _prepare(self, session: str, message: Any) -> Any:
-        return self.core.prepare(message, partial(self.transactions.recall, session))
+        return self.core.prepare(self.states.get(session), message, partial(self.transactions.recall, session))
 
     # --- life ---
 

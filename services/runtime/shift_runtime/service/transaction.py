@@ -49,6 +49,8 @@ class Transaction:
     before: dict[str, Any] = field(default_factory=dict)
     """By session, the state that :meth:`Transactions.commit` restores where the disk refuses."""
     facts: list[tuple[OutboxRow, Fact]] = field(default_factory=list)
+    heads: dict[str, int] = field(default_factory=dict)
+    """By session, the number of its last fact in this transaction."""
     replies: list[PendingReply] = field(default_factory=list)
     refusals: list[tuple[PendingRequest, ShiftError]] = field(default_factory=list)
 
@@ -102,12 +104,12 @@ class Transactions(Generic[S]):
         transaction.before.setdefault(session, self._states.loaded(session))
         self._states.put(session, step.state)
         transaction.batch.states[session] = ""
-        for fact in step.facts:
-            row = OutboxRow(
-                session=session, seq=self.head(session) + 1, subject=fact.subject, payload=fact.model_dump_json()
-            )
+        head = self.head(session)
+        for seq, fact in enumerate(step.facts, start=head + 1):
+            row = OutboxRow(session=session, seq=seq, subject=fact.subject, payload=fact.model_dump_json())
             transaction.batch.rows.append(row)
             transaction.facts.append((row, fact))
+        transaction.heads[session] = head + len(step.facts)
 
     def mark_read(self, read: ReadFact) -> None:
         """Note that a fact of another service was processed."""
@@ -141,10 +143,7 @@ class Transactions(Generic[S]):
 
     def head(self, session: str) -> int:
         """Return the number of the session's last fact, committed or not."""
-        for row in reversed(self.open.batch.rows):
-            if row.session == session:
-                return row.seq
-        return self._journal.heads.get(session, 0)
+        return self.open.heads.get(session) or self._journal.heads.get(session, 0)
 
     def recall(self, session: str, subject: str, **fields: str | int) -> list[Fact]:
         """Return the session's own facts of ``subject`` whose fields have these values, oldest first."""
