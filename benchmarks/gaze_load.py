@@ -1,8 +1,8 @@
 """How many people with gaze at 120 Hz a mesh carries, and what one chunk costs each service.
 
 A generator in a process of its own sends real recordings (``tests/data/gaze``, thinned to 120 Hz) in chunks of ten
-samples, over Zenoh or over one WebSocket for each session. After the last chunk the benchmark waits until every sample is in the
-observations: that time is how far the mesh is behind. The processor time of each service stands in ``/proc``.
+samples, over Zenoh or over one WebSocket for each session. After the last chunk the benchmark waits until every sample
+is in the observations: that time is how far the mesh is behind. The processor time of each service stands in ``/proc``.
 The reference is a loop that reads and writes the same chunks as JSON, in this process, in the same run.
 
     python benchmarks/gaze_load.py --people 20

@@ -32,13 +32,15 @@ class InputsMissing(Exception):
     """A command cannot be answered before its owner has read more of its inputs.
 
     The runtime waits for the facts of ``owners``. After ``give_up_s`` it steps the command again with
-    ``timed_out=True``; the core then answers with the inputs that it has, or raises an error.
+    ``timed_out=True``; the core then answers with the inputs that it has, or raises an error. The owners in
+    ``holding`` may hold back what is missing until they are asked, so they are asked at once.
     """
 
-    def __init__(self, owners: tuple[str, ...], give_up_s: float) -> None:
+    def __init__(self, owners: tuple[str, ...], give_up_s: float, holding: tuple[str, ...] = ()) -> None:
         super().__init__(f"waiting for {', '.join(owners)}")
         self.owners = owners
         self.give_up_s = give_up_s
+        self.holding = holding
 
 
 def covers(seen: Seen, required: Seen) -> bool:

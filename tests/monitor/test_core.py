@@ -7,7 +7,7 @@ import random
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shift_monitor.core import MonitorState, dump, gaze_chunk_of, initial, load, step
+from shift_monitor.core import MonitorState, Show, dump, gaze_chunk_of, initial, load, step
 from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Conflict, Unavailable, UnknownThing
 from shift_schemas.messages import (
@@ -159,17 +159,18 @@ def test_inputs_follow_from_outputs_and_give_the_same_outputs(seed: int) -> None
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_every_applied_input_publishes_one_observation_of_the_next_version(seed: int) -> None:
+def test_every_applied_input_is_shown_by_one_observation_of_the_next_version(seed: int) -> None:
     state, version = None, 0
     for event in a_session(seed):
         done = step(state, event, NOW)
-        state = done.state
-        found = [f for f in done.facts if isinstance(f, Observation)]
-        if done.facts:
+        shown = step(done.state, Show(), NOW)
+        state, facts = shown.state, (*done.facts, *shown.facts)
+        found = [f for f in facts if isinstance(f, Observation)]
+        if facts:
             version += 1
             assert [f.version for f in found] == [version]
-            assert done.facts[-1] is found[0]
-            assert all(f.seen == found[0].seen for f in done.facts)
+            assert facts[-1] is found[0]
+            assert all(f.seen == found[0].seen for f in facts)
         assert state.version == version
 
 

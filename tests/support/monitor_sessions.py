@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from shift_monitor.core import MonitorState, step
+from shift_monitor.core import MonitorState, Show, step
 from shift_monitor.gaze_input import gaze_input
 from shift_schemas.messages import (
     FORMAT,
@@ -95,14 +95,15 @@ class Recorded:
 def fold(
     state: MonitorState | None, *events: Message, recorded: Recorded | None = None
 ) -> tuple[MonitorState, list[Fact]]:
-    """Step through events; ``recorded`` and the gaze of this fold tell repeats from restarts."""
+    """Step through events and show each observation at once; ``recorded`` and the gaze tell repeats from restarts."""
     facts: list[Fact] = []
     kept = recorded or Recorded()
     for event in events:
         done = step(state, gaze_input(event, kept) if isinstance(event, GazeChunk) else event, NOW)
         kept.gaze += [f for f in done.facts if isinstance(f, Gaze)]
-        state = done.state
-        facts += done.facts
+        shown = step(done.state, Show(), NOW)
+        state = shown.state
+        facts += (*done.facts, *shown.facts)
     assert state is not None
     return state, facts
 

@@ -73,7 +73,9 @@ class Session:
         )
         self.do("recorder", start)
 
-    def do(self, owner: str, message: Fact | Command | GazeChunk, timed_out: bool = False) -> tuple[Fact, ...]:
+    def do(
+        self, owner: str, message: Fact | Command | GazeChunk | monitor.Show, timed_out: bool = False
+    ) -> tuple[Fact, ...]:
         """Step a core and put out what it gives."""
         self.now_ns += 1_000_000
         step = CORES[owner](self.states[owner], message, Stamp.of(self.now_ns), timed_out=timed_out)
@@ -136,7 +138,9 @@ class Session:
             try:
                 self.do("decider", command, timed_out=timed_out)
                 break
-            except InputsMissing:
+            except InputsMissing as missing:
+                if missing.holding and self.rng.random() < 0.5:
+                    self.do("monitor", monitor.Show())
                 self.deliver(1)
         self.answered = self.answered.model_copy(update={"decision": n})
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from shift_recording.mcap.reader import RecordedMessage, Recording
-from shift_schemas.messages import Configure, Decision
+from shift_schemas.messages import FORMAT, Configure, Decision
 from shift_schemas.registry import OWNERS
 from shift_verify.decider import DeciderFold, decider_verification
 from shift_verify.decider_before_format_3 import DeciderSearch
@@ -204,7 +204,7 @@ def test_metadata_names_the_format_from_3_on(recording: Path, tmp_path: Path) ->
         whole = Recording(path)
         list(whole.messages())
         metadata.append(whole.metadata["shift:session"].get("format"))
-    assert metadata == ["3", None]
+    assert metadata == [str(FORMAT), None]
 
 
 def test_dropped_estimate_of_an_unchanged_configuration_is_missed(tmp_path: Path) -> None:

@@ -18,6 +18,9 @@ class OutboxQuery(Message):
     limit: Annotated[int, Field(ge=1, le=10_000)] = 1000
     only: list[Id] | None = Field(default=None, description="Only these sessions; left out: all.")
     closed: bool = Field(default=False, description="Include sessions that have ended.")
+    current: bool = Field(
+        default=False, description="Publish first what the owner holds back of the sessions in `only`."
+    )
 
 
 class OutboxRow(Message):

@@ -221,7 +221,7 @@ def decide(state: DeciderState, task: str, decision_id: str, required: Seen, now
     study = _study(state, missing, timed_out)
     check_task(study, task)
     if missing.owners and not timed_out:
-        raise InputsMissing(missing.owners, study.decider.wait_s)
+        raise InputsMissing(missing.owners, study.decider.wait_s, holding=_holding(state, required))
     if state.observation is None or state.config is None:
         raise Unavailable("the monitor has not published an observation of this session yet; ask again")
     triple = triple_of(state.observation, task)
@@ -243,6 +243,14 @@ def decide(state: DeciderState, task: str, decision_id: str, required: Seen, now
         required=required if state.records_inputs else None,
         override_id=override.override_id if override else "", reason=override.reason if override else "",
     )  # fmt: skip
+
+
+def _holding(state: DeciderState, required: Seen) -> tuple[str, ...]:
+    """Return the monitor if the gaze that is required may be in an observation that it holds back."""
+    seen = state.observation
+    if seen is not None and seen.version >= required.observation and covers_gaze(seen.seen, required):
+        return ()
+    return ("monitor",)
 
 
 class Choice(NamedTuple):

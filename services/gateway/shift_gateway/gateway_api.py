@@ -51,6 +51,7 @@ class GatewayApi(MeshApi):
     async def observation(self, session: str) -> dict[str, Any]:
         """Return the partner model, which includes all that was answered before."""
         view = await self._current(session, "monitor")
+        await self.read_model.show(session)
         version, required = view.required.observation, _of_the_inputs(view.required)
 
         def newest() -> Observation | None:
@@ -102,6 +103,7 @@ class GatewayApi(MeshApi):
         view = await self._current(session, "decider")
         wait_s = await self._wait_s(view)
         await self._read(view, ("decider",))
+        await self.read_model.show(session)
 
         def attempt(timed_out: bool) -> dict[str, Any] | None:
             try:

@@ -1,13 +1,17 @@
 """The monitor's core: the partner model as a fold, ``step(state, event, now) -> Step``. Pure.
 
 It opens nothing and reads no clock: the stamp comes with the event, and gaze carries the time of its source's clock.
-Each applied input publishes exactly one observation, as the last of its facts. The observation's ``seen`` names the
-inputs that were applied, so the order of the inputs follows from the outputs, and a recording can be folded again.
+Each applied input but gaze publishes exactly one observation, as the last of its facts. An observation's ``seen`` names
+the inputs that were applied, and each chunk of gaze is a fact of its own, so the order of the inputs follows from the
+outputs, and a recording can be folded again.
+
+The observation of a chunk may be held back (:func:`shift_monitor.published.is_due`). :class:`Show` publishes it: the
+runtime steps it when somebody needs what is held back.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import UnknownThing
@@ -25,7 +29,17 @@ from shift_monitor.prepared_study import prepare_study
 from shift_monitor.published import fixation_fact, observation_of, publish
 from shift_monitor.state import MonitorState, dump, initial, load, study_in_force
 
-__all__ = ["MonitorState", "dump", "gaze_chunk_of", "initial", "load", "observation_of", "step"]
+__all__ = ["MonitorState", "Show", "dump", "gaze_chunk_of", "held", "initial", "load", "observation_of", "step"]
+
+
+@dataclass(frozen=True)
+class Show:
+    """Somebody needs the observation that is held back."""
+
+
+def held(state: MonitorState) -> Show | None:
+    """Return the event that publishes what is held back, or None if nothing is."""
+    return Show() if state.held and not state.ended else None
 
 
 def step(state: MonitorState | None, event: object, now: Stamp, timed_out: bool = False) -> Step[MonitorState]:
@@ -66,6 +80,8 @@ def step(state: MonitorState | None, event: object, now: Stamp, timed_out: bool 
             return step_gaze(state, event, now, timed_out)
         case GazeChunk():
             return step_gaze(state, ChunkWithHistory(event), now, timed_out)
+        case Show():
+            return publish(state, now) if state.held else Step(state)
     return Step(state)
 
 

@@ -37,7 +37,7 @@ from shift_monitor.gaze_warnings import (
     share_warnings,
 )
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
-from shift_monitor.published import SourcedFixation, fixation_fact, gaze_fact, gaze_result, publish
+from shift_monitor.published import SourcedFixation, fixation_fact, gaze_fact, gaze_result, is_due, publish
 from shift_monitor.state import MonitorState, study_in_force
 
 MOST_SOURCES = 256
@@ -68,7 +68,8 @@ def step_gaze(state: MonitorState, gaze: ChunkWithHistory, now: Stamp, timed_out
         raise Conflict(f"session {state.session} has ended")
     prepared = study_in_force(state, timed_out)
     if (first := find_repeated(gaze)) is not None:
-        return Step(state, result=gaze_result(chunk, first.accepted, state.version, first.warnings), repeat=True)
+        shown_in = state.version + state.held
+        return Step(state, result=gaze_result(chunk, first.accepted, shown_in, first.warnings), repeat=True)
     _check_source(state, chunk)
     check_samples(chunk, prepared)
     times = [round(t * NS) for t in chunk.t]
@@ -183,11 +184,12 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
     warnings = _recorded_warnings(state, [*onto.warnings, *jumps, *quality])
     after = replace(
         state, stream=stream, attention=attention, dropped=dropped, fixations=state.fixations + len(found),
-        samples=state.samples + len(times), received=now, gaze_warnings=warnings,
+        samples=state.samples + len(times), received=now, gaze_warnings=warnings, held=True,
     )  # fmt: skip
     ended = [*onto.ended, *((chunk.source, stream.segment, f) for f in found)]
     facts = (gaze_fact(after, chunk, now, "applied"), *(fixation_fact(after, f, now) for f in ended))
-    return publish(after, now, facts, gaze_result(chunk, len(times), after.version + 1, warnings))
+    result = gaze_result(chunk, len(times), after.version + 1, warnings)
+    return publish(after, now, facts, result) if is_due(after) else Step(after, facts, result)
 
 
 def _quality_warnings(stream: GazeStream, points: bool, prepared: PreparedStudy) -> list[str]:

@@ -27,18 +27,47 @@ from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_account import EMPTY_ACCOUNT, shares
 from shift_monitor.gaze_columns import recorded_columns
 from shift_monitor.prepared_study import name_of, prepare_study
-from shift_monitor.state import MonitorState
+from shift_monitor.state import MonitorState, Shown
 
 SourcedFixation = tuple[str, int, EndedFixation]
 """A fixation that ended, with its source and segment."""
+
+
+SHOW_AFTER_NS = 250_000_000
+"""Chosen: gaze that changes neither its class nor its warnings is shown after this much time of its source, which is
+shorter than a glance and a third of the observations at 120 Hz."""
 
 
 def publish(
     state: MonitorState, now: Stamp, facts: tuple[Fact, ...] = (), result: dict[str, Any] | None = None
 ) -> Step[MonitorState]:
     """Return a step that publishes these facts and, as the last one, the next observation."""
-    after = replace(state, version=state.version + 1)
+    shown = shown_of(state) if state.study else None
+    after = replace(state, version=state.version + 1, shown=shown, held=False)
     return Step(after, (*facts, observation_of(after, now)), result or {})
+
+
+def shown_of(state: MonitorState) -> Shown:
+    """Return what an observation of this state shows of gaze."""
+    category = gaze_class(state.attention, prepare_study(state.study).study.attention)
+    stream = state.stream
+    source, last_ns = (stream.source, stream.last_ns) if stream is not None else ("", None)
+    return Shown(category, state.gaze_warnings, source, last_ns)
+
+
+def is_due(state: MonitorState) -> bool:
+    """Return whether an observation follows the chunk that was applied last.
+
+    It does where the class of gaze, its warnings or its source change, and every :data:`SHOW_AFTER_NS` of the source's
+    time. Before format 4 it follows every chunk.
+    """
+    before = state.shown
+    if before is None or state.format < 4:
+        return True
+    found = shown_of(state)
+    if before[:3] != found[:3] or before.last_ns is None or found.last_ns is None:
+        return True
+    return not 0 <= found.last_ns - before.last_ns < SHOW_AFTER_NS
 
 
 def observation_of(state: MonitorState, now: Stamp) -> Observation:

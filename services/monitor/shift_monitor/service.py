@@ -28,5 +28,6 @@ CORE: Core[MonitorState] = Core(
     load=core.load,
     reads=READS["monitor"],
     prepare=prepared,
+    held=core.held,
     lookups={"gaze": ("source", "seq")},
 )

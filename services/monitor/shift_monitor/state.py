@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from pydantic import TypeAdapter
+from shift_model.vocabulary import GazeClass
 from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Unavailable
 from shift_schemas.messages import GazeChunk, Session
@@ -21,6 +23,16 @@ CONFIG_WAIT_S = 0.2
 
 UNSET_CAPACITY, UNSET_ATTENTION = Capacity(0.0), Attention(())
 """The values before the first configuration, which sets the start values."""
+
+
+class Shown(NamedTuple):
+    """What the last observation showed of gaze; the next one follows where this changes, or after a while."""
+
+    category: GazeClass
+    warnings: tuple[str, ...]
+    source: str
+    last_ns: int | None
+    """The time of the source's last sample."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +63,10 @@ class MonitorState:
     decision: int = 0
     performance: int = 0
     config: int = 0
+    shown: Shown | None = None
+    """What the last observation showed of gaze; None before the first one."""
+    held: bool = False
+    """Whether gaze was applied that no observation shows yet."""
 
 
 _STATE = TypeAdapter(MonitorState)

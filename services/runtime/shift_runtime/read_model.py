@@ -16,6 +16,7 @@ from shift_schemas.messages import (
     Config,
     Decision,
     Fact,
+    Gaze,
     Observation,
     Override,
     Performance,
@@ -48,6 +49,8 @@ class SessionView:
     """Each decision id with its task."""
     performances: int = 0
     overrides: dict[str, Override] = field(default_factory=dict)
+    held: bool = False
+    """Whether gaze was read that no observation shows yet: the monitor holds it back until somebody asks."""
     n: int = 0
     counts: Counter[str] = field(default_factory=Counter)
     answered: Counter[str] = field(default_factory=Counter)
@@ -129,6 +132,13 @@ class ReadModel:
             return there()
         return True
 
+    async def show(self, session: str) -> None:
+        """Read what the monitor holds back of the session, where it holds back something that was answered or read."""
+        view = self.views[session]
+        shown = view.observation.version if view.observation else 0
+        if view.held or shown < view.answered["observation"]:
+            await self.reader.pull("monitor", session, current=True)
+
     def has_read(self, session: str, owner: str) -> bool:
         """Return whether the read model has all facts of ``owner`` that clients were answered."""
         wanted = self.views[session].sequences.get(owner, 0)
@@ -161,7 +171,9 @@ def _fold(view: SessionView, fact: Fact) -> None:
         case Config():
             view.config = fact
         case Observation():
-            view.observation = fact
+            view.observation, view.held = fact, False
+        case Gaze():
+            view.held = True
         case Policy():
             view.policy = fact
         case Decision():

@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import structlog
 from shift_schemas.codec import decode, encode
@@ -32,6 +33,14 @@ SESSION_OWNER = Session.owner
 """The owner whose facts say that a session exists."""
 REPLAY_MARK = b"replay:"
 """The prefix of a replayed fact's sequence number. Tools that listen receive it; a reader ignores it."""
+
+
+class Pull(NamedTuple):
+    """What is pulled: an owner's outbox, one session of it, and first what the owner holds back of that session."""
+
+    owner: str
+    session: str | None = None
+    current: bool = False
 
 
 @dataclass(frozen=True)
@@ -79,8 +88,8 @@ class Reader:
     """By owner and session, a sentence if the owner's journal is older than what was read of it."""
     lost: Callable[[str], None] = lambda owner: None
     """Called with each owner that does not answer any more."""
-    _pulls: dict[tuple[str, str | None], asyncio.Task[bool]] = field(default_factory=dict)
-    _again: set[tuple[str, str | None]] = field(default_factory=set)
+    _pulls: dict[Pull, asyncio.Task[bool]] = field(default_factory=dict)
+    _again: set[Pull] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         """Set up the links to the owners."""
@@ -142,9 +151,12 @@ class Reader:
         self.cursors[row.session, owner] = row.seq
         self.deliver(read)
 
-    def pull_soon(self, owner: str, session: str | None = None) -> asyncio.Task[bool]:
-        """Pull in the background; a request during a pull causes one more pull after it."""
-        key = (owner, session)
+    def pull_soon(self, owner: str, session: str | None = None, current: bool = False) -> asyncio.Task[bool]:
+        """Pull in the background; a request during a pull causes one more pull after it.
+
+        With ``current``, the owner first publishes what it holds back of ``session``.
+        """
+        key = Pull(owner, session, current)
         running = self._pulls.get(key)
         if running is not None and not running.done():
             self._again.add(key)
@@ -153,9 +165,9 @@ class Reader:
         self._pulls[key] = task
         return task
 
-    async def pull(self, owner: str, session: str | None = None) -> bool:
+    async def pull(self, owner: str, session: str | None = None, current: bool = False) -> bool:
         """Read the owner's outbox to its end; return whether it answered."""
-        return await asyncio.shield(self.pull_soon(owner, session))
+        return await asyncio.shield(self.pull_soon(owner, session, current))
 
     async def pull_all(self, owners: Iterable[str], session: str | None = None) -> tuple[str, ...]:
         """Pull several owners; return those that did not answer."""
@@ -163,14 +175,14 @@ class Reader:
         answered = await asyncio.gather(*(self.pull(o, session) for o in wanted))
         return tuple(o for o, ok in zip(wanted, answered, strict=True) if not ok)
 
-    async def _pull_until_current(self, key: tuple[str, str | None]) -> bool:
+    async def _pull_until_current(self, key: Pull) -> bool:
         while True:
             self._again.discard(key)
             answered = await self._pull(*key)
             if key not in self._again or not answered:
                 return answered
 
-    async def _pull(self, owner: str, session: str | None) -> bool:
+    async def _pull(self, owner: str, session: str | None, current: bool) -> bool:
         knows_sessions = owner == SESSION_OWNER or SESSION_OWNER in self.synced or SESSION_OWNER not in self.owners
         past: dict[str, int] = {}
         """Heads of sessions that are done: an owner that has not closed them yet would send them from their start."""
@@ -180,6 +192,7 @@ class Reader:
                 cursors=cursors | past,
                 only=None if session is None else [session],
                 closed=self.closed and owner == SESSION_OWNER,
+                current=current,
             )
             page = await self._page(owner, query)
             if page is None:

@@ -92,6 +92,7 @@ class Mesh:
             chunk, self._clock_ns = chunk_of(self.study, looks, SOURCE, self._chunks, self._clock_ns)
             self._chunks += 1
             self._apply(chunk)
+            self._apply(monitor.Show())
 
     def decide(self, task: str, n: int) -> Decision:
         """Return the decision for a task in interaction ``n``."""
@@ -118,7 +119,7 @@ class Mesh:
             self._apply(fact)
         return next(fact for fact in done.facts if isinstance(fact, Performance))
 
-    def _apply(self, event: Fact | GazeChunk) -> None:
+    def _apply(self, event: Fact | GazeChunk | monitor.Show) -> None:
         """Apply a fact or a chunk of gaze to the cores, and the facts that result from it to the decider."""
         observed = monitor.step(self._monitor, event, self._now)
         self._monitor = observed.state

@@ -1,6 +1,8 @@
 """Derive the outputs of the monitor and of the learner again. Pure.
 
-A group of the monitor's facts ends with an observation, a group of the learner's facts with a policy.
+A group of the learner's facts ends with a policy, and one of the monitor's with an observation. Where the monitor holds
+the observation of a chunk of gaze back (from format 4 on), the group ends with the chunk or with its last fixation, and
+an observation of its own follows later.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from shift_learner import core as learner
 from shift_monitor import core as monitor
 from shift_monitor.gaze_input import ChunkWithHistory, RecordedChunk
 from shift_schemas.core_protocol import Step
+from shift_schemas.errors import ShiftError
 from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import (
     Fact,
@@ -42,6 +45,34 @@ class MonitorFold(OutputFold):
         super().__init__(inputs)
         self._numbers: dict[tuple[str, int], tuple[int, ...]] = {}
         """By source and chunk number: the segments in which the number was used."""
+        self._last: FactAtPlace | None = None
+        self._before_show: monitor.MonitorState | None = None
+        """The state before the last group if that was an observation that had been held back."""
+        self._gaze: ChunkWithHistory | None = None
+        """The chunk of the open group."""
+        self._length = 0
+        """How many facts the open group of a chunk has without an observation; 0 if an observation ends it."""
+
+    def take(self, placed: FactAtPlace) -> None:
+        """Derive up to the owner's next fact. Raises :class:`Differs`, ``NotRecorded``."""
+        self._last, self._before_show = placed, None
+        if not self.group and isinstance(placed.fact, Gaze):
+            self._gaze = self._gaze_input(placed.fact)
+            self._length = self._length_without_observation(placed.fact, self._gaze)
+        super().take(placed)
+
+    def ends_group(self, placed: FactAtPlace) -> bool:
+        """Return whether this fact is the last one of the open group."""
+        return isinstance(placed.fact, Observation) or len(self.group) == self._length
+
+    def _length_without_observation(self, fact: Gaze, gaze: ChunkWithHistory) -> int:
+        if self.inputs.session.format < 4:
+            return 0
+        try:
+            facts = self.step(self.state, gaze, fact.stamp).facts
+        except (ShiftError, ValueError, LookupError):
+            return 0  # the difference is found when the group is derived
+        return 0 if isinstance(facts[-1], Observation) else len(facts)
 
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """Return the step of the core, without waiting."""
@@ -51,7 +82,7 @@ class MonitorFold(OutputFold):
         """Return the input of a group: gaze is its own input; otherwise exactly one number in ``seen`` is higher."""
         first, last = group[0].fact, group[-1]
         if isinstance(first, Gaze):
-            return self._gaze_input(first)
+            return self._gaze
         seen = last.fact.seen
         for subject in ("config", "decision", "performance"):
             before: int = getattr(self.state, subject)
@@ -59,9 +90,28 @@ class MonitorFold(OutputFold):
                 return self.inputs.get(subject, before + 1, last)
         if self.inputs.ending is None and not isinstance(last.fact, Observation):
             return None
+        if self.state.held and len(group) == 1 and self._is_shown(last.fact):
+            return monitor.Show()
         if self.inputs.ending is None or self.state.ended:
             _raise_without_input(last, self.inputs.complete)
         return self.inputs.ending
+
+    def _is_shown(self, fact: Fact) -> bool:
+        """Return whether an observation is the one that was held back; the session's end publishes one as well."""
+        if self.inputs.ending is None or self.state.ended:
+            return True
+        self._before_show = self.state
+        return self.step(self.state, monitor.Show(), fact.stamp).facts == (fact,)
+
+    def end(self) -> None:
+        """Derive the rest. An observation that is held back and the one of the session's end can be the same."""
+        before, ending = self._before_show, self.inputs.ending
+        if before is not None and self._last is not None and ending is not None and not self.state.ended:
+            self.state, self.group = before, [self._last]
+            self.checked[self._last.fact.subject] -= 1
+            self.state = self._derive(ending, whole=True).state
+            self.group = []
+        super().end()
 
     def _gaze_input(self, fact: Gaze) -> ChunkWithHistory:
         """Return the chunk with the segments of its source that had its number before, which show a restart."""
@@ -81,9 +131,16 @@ class MonitorFold(OutputFold):
         """Return the subject of the message that is lost before ``following``."""
         if isinstance(following, Fixation):
             return "gaze" if self._has_new_gaze(following) else "observation"
+        if isinstance(following, Gaze) and self.inputs.session.format >= 4 and self._is_skipped_before(following):
+            return "gaze"
         if isinstance(following, Observation) and following.version == self.state.version + 1:
             return "gaze" if self._has_new_gaze(following) else "fixation"
         return "observation"
+
+    def _is_skipped_before(self, following: Gaze) -> bool:
+        """Return whether numbers of the source are missing before a chunk."""
+        stream = self.state.stream
+        return stream is not None and stream.source == following.source and following.seq > stream.numbering.last + 1
 
     def _has_new_gaze(self, fact: Fact) -> bool:
         stream = self.state.stream

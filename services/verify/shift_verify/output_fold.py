@@ -52,11 +52,15 @@ class OutputFold:
         """Derive up to the owner's next fact. Raises :class:`Differs`, ``NotRecorded``."""
         self.group.append(placed)
         self.sequence = placed.sequence
-        if isinstance(placed.fact, self.closing):
+        if self.ends_group(placed):
             event = self.input_of(self.group)
             assert event is not None
             self.state = self._derive(event, whole=True).state
             self.group = []
+
+    def ends_group(self, placed: FactAtPlace) -> bool:
+        """Return whether this fact is the last one of the open group."""
+        return isinstance(placed.fact, self.closing)
 
     def gap(self, following: FactAtPlace) -> None:
         """Raise which message is lost before ``following``."""

@@ -38,5 +38,7 @@ class Core(Generic[S]):
     reads: Mapping[str, frozenset[str]]
     prepare: Callable[[S | None, Any, Recall], Any] = lambda state, message, recall: message
     """Turns a request's message into what the core steps on, given the state and the facts recorded before."""
+    held: Callable[[S], Any | None] = lambda state: None
+    """Returns the event that makes the core publish what it holds back, or None if it holds nothing back."""
     lookups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """By subject of its own, the fields by which ``recall`` finds facts."""

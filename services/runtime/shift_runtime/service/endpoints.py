@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sized
+from collections.abc import Callable, Sequence, Sized
 from dataclasses import dataclass
 
 from shift_schemas.codec import decode, encode
@@ -34,6 +34,8 @@ class ServiceEndpoints:
     states: Sized
     schedule: Callable[[Callable[[], None]], None]
     """Runs a function in the worker's turn: a worker that hangs must not report that it is healthy."""
+    publish_for: Callable[[Sequence[str], Callable[[], None]], None]
+    """Publishes what is held back of these sessions, and then calls the function."""
     _reported_overload: int = 0
 
     def declare(self) -> None:
@@ -71,7 +73,14 @@ class ServiceEndpoints:
             self.metrics.dropped("malformed")
             request.refuse(encode(Problem.of(e)))
             return
-        request.reply(encode(self.journal.page(query, self.progress.processed)))
+
+        def reply() -> None:
+            request.reply(encode(self.journal.page(query, self.progress.processed)))
+
+        if query.current:
+            self.publish_for(query.only or (), reply)
+        else:
+            reply()
 
     def _on_health(self, request: Request) -> None:
         self.schedule(lambda: request.reply(encode(self.health())))

@@ -9,6 +9,7 @@ this module puts together:
 ``waiting``            requests that wait for their inputs, and what is pulled for them
 ``transaction``        commit, deferred commit, undo
 ``notifications``      when and in which order committed facts are published
+``held_back``          what the core holds back until somebody asks for it
 ``extension``          what a service adds: the sink of the facts of others, the protocol of ends in two halves
 =====================  ====================================================================================
 """
@@ -39,6 +40,7 @@ from shift_runtime.service.core_sink import CoreSink
 from shift_runtime.service.disk_alarm import DiskAlarm
 from shift_runtime.service.endpoints import ServiceEndpoints
 from shift_runtime.service.extension import Extension, NoEndProtocol
+from shift_runtime.service.held_back import HeldBack
 from shift_runtime.service.notifications import Notifications
 from shift_runtime.service.progress import Progress
 from shift_runtime.service.requests import PendingRequest, Requests
@@ -87,9 +89,10 @@ class Worker(Generic[S]):
         self.waiting = Waiting(core.name, self.reader, self.tasks, self.enqueue)
         self.requests = Requests(core.name, bus, journal, metrics, self.waiting.join, self.enqueue)
         self.notifications = Notifications(bus, metrics)
+        self.held_back = HeldBack(core, self.states, self.transactions, clock, self.enqueue)
         self.endpoints = ServiceEndpoints(
             core.name, bus, journal, metrics, self.reader, self.progress, self.claim, self.alarm, self.states,
-            self.enqueue,
+            self.enqueue, self.held_back.publish_for,
         )  # fmt: skip
         self._queue: deque[Item] = deque()
         self._wake = asyncio.Event()
@@ -188,6 +191,7 @@ class Worker(Generic[S]):
             for request in self.waiting.release(session):
                 self._answer(request)
         self._commit()
+        self.held_back.after_commit()
         await asyncio.sleep(0)
 
     def _answer(self, request: PendingRequest) -> None:
@@ -216,6 +220,7 @@ class Worker(Generic[S]):
         else:
             self.transactions.apply_step(request.session, step)
             self.transactions.store_answer(request, step)
+            self.held_back.note(request.session, step.state)
 
     def _step(self, request: PendingRequest, message: Any) -> Step[S]:
         return self.core.step(self.states.get(request.session), message, self.clock.now(), timed_out=request.timed_out)

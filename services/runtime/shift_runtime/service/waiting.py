@@ -24,8 +24,8 @@ class Puller(Protocol):
     def owners(self) -> tuple[str, ...]:
         """The owners that the service reads."""
 
-    def pull_soon(self, owner: str) -> Any:
-        """Read the owner's outbox in the background."""
+    def pull_soon(self, owner: str, session: str | None = None, current: bool = False) -> Any:
+        """Read the owner's outbox, or one session of it, in the background."""
 
     def pull(self, owner: str) -> Awaitable[bool]:
         """Read the owner's outbox to its end; return whether it answered."""
@@ -56,6 +56,8 @@ class Waiting:
             request.deadline = loop.time() + missing.give_up_s
             loop.call_later(missing.give_up_s, self._give_up, request)
             loop.call_later(min(NOTIFICATION_WAIT_S, missing.give_up_s / 2), self._pull_for, request, missing.owners)
+            for owner in missing.holding:
+                self._reader.pull_soon(owner, request.session, current=True)
         self._parked.setdefault(request.session, []).append(request)
 
     def release(self, session: str) -> list[PendingRequest]:
