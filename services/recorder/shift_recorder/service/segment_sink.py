@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import shutil
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import structlog
@@ -28,6 +29,12 @@ from shift_recorder.core import RecorderState
 log = structlog.get_logger()
 
 FLUSH_EVERY_S = 1.0
+
+
+@lru_cache(maxsize=64)
+def _schemas_of(study: str) -> dict[str, bytes]:
+    """Return the recording's schemas for a study as ``config`` has it; most sessions have the same study."""
+    return subject_schemas(study_from_json(study))
 
 
 class SegmentSink:
@@ -105,8 +112,7 @@ class SegmentSink:
     def write(self, session: str, state: RecorderState, fact: Fact, sequence: int) -> None:
         """Append a fact to the session's segment. Raises :class:`StorageFailed`."""
         if session not in self._writers:
-            schemas = subject_schemas(study_from_json(state.config.study))
-            self._writers[session] = SegmentWriter(self.segments, session, schemas)
+            self._writers[session] = SegmentWriter(self.segments, session, _schemas_of(state.config.study))
         now = self._clock.now().ns
         self._writers[session].write(fact.subject, sequence, now, fact.stamp.ns, recorded_json(fact))
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 from shift_schemas.codec import VERSION
@@ -67,9 +68,15 @@ def schema_of(subject: str, names: Names) -> Schema:
     A field that may be ``None`` has the type that it has otherwise and is not required, since
     :func:`recorded_json` leaves it out; every other field is always written, hence required.
     """
-    whole = FACTS[subject].model_json_schema()
+    whole = _published_schema(subject)
     flat = _flat(whole, whole.get("$defs", {}), subject, names)
     return {"title": schema_name(subject), **flat}
+
+
+@cache
+def _published_schema(subject: str) -> Schema:
+    """Return the JSON schema of a subject's message; it is the same for every session."""
+    return FACTS[subject].model_json_schema()
 
 
 def recorded_json(fact: Fact) -> bytes:
