@@ -88,7 +88,10 @@ async def _load(url: str, kind: str, turn: int, clients: int) -> float:
 async def _answered(
     reader: asyncio.StreamReader, writer: asyncio.StreamWriter, method: str, path: str, body: object
 ) -> None:
-    """Make one request on an open connection, with as little work as possible: a client library costs more than hello."""
+    """Make one request on an open connection with as little work as possible.
+
+    A client library would cost more than the request of `hello`.
+    """
     content = json.dumps(body).encode() if body is not None else b""
     head = f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\nContent-Length: "
     writer.write(f"{head}{len(content)}\r\n\r\n".encode() + content)
