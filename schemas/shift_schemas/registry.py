@@ -75,9 +75,9 @@ STREAM_ITEMS = stream_types()
 """The items of every stream by the stream's name."""
 
 SUBJECTS: tuple[str, ...] = tuple(FACTS)
-"""Subjects in INTERFACE.md's order; they are the recording's topics."""
+"""The subjects in the order of docs/interface.md; they are the topics of a recording."""
 OWNER_OF: dict[str, str] = {subject: fact.owner for subject, fact in FACTS.items()}
-"""The owner of each subject: each fact has exactly one (DESIGN.md, "The loop")."""
+"""The owner of each subject: each fact has exactly one (docs/design.md)."""
 OWNERS: dict[str, tuple[str, ...]] = {owner: tuple(s for s in FACTS if OWNER_OF[s] == owner) for owner in READS}
 """The subjects that each owner publishes."""
 PROCEDURE_OWNER: dict[str, str] = {procedure: command.owner for procedure, command in COMMANDS.items()}

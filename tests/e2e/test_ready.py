@@ -12,7 +12,7 @@ from support.whole_mesh import LiveMesh
 
 SERVICES = ("recorder", "monitor", "decider", "learner")
 WITHIN_S = 5.0
-"""RELIABILITY.md, row 9; a bound on waiting here, generous enough for a busy machine: the answer takes 1 s."""
+"""The longest wait, s; generous for a busy machine, because the answer takes 1 s."""
 
 
 def named(mesh: LiveMesh, service: str) -> None:

@@ -1,4 +1,4 @@
-"""RELIABILITY.md, rows 1 to 4: kill -9 at any moment. Counted: every interaction once, sequences 1..N."""
+"""Services are killed with kill -9 at any moment; every interaction counts once, and the sequences are 1..N."""
 
 from __future__ import annotations
 

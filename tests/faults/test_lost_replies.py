@@ -1,4 +1,4 @@
-"""RELIABILITY.md, row 5: the service dies after its commit and before its reply, for every kind of command."""
+"""A service dies after its commit and before its reply, for every kind of command."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""RELIABILITY.md, rows 10 to 12: nothing there at the start, a disk that is full, a folder that must not be written."""
+"""Faults at the start and on the disk: no services yet, a full disk, a folder that cannot be written."""
 
 from __future__ import annotations
 

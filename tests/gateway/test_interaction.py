@@ -464,7 +464,7 @@ MODEL = {
     ("high", "distracted"): (UF, UF, DM, UF, DM),
     ("high", "focused"): (EO, EO, EM, EO, EM),
 }
-"""MODEL.md, section 2; uncertain counts as distracted."""
+"""docs/model.md; uncertain counts as distracted."""
 RESULTS = {
     "failure": (False, False), "misconception_enabledness": (True, False), "misconception_comprehension": (False, True),
     "success": (True, True),

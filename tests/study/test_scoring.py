@@ -21,7 +21,7 @@ MODEL = {
     ("high", "uncertain"): (UF, UF, DM, UF, DM),
     ("high", "focused"): (EO, EO, EM, EO, EM),
 }
-"""MODEL.md, section 2: unknown, failure, misc. enabl., misc. compreh., success."""
+"""docs/model.md: unknown, failure, miscalibrated enablement, miscalibrated comprehension, success."""
 DEFAULT = Study(study="x").scoring
 
 

@@ -1,4 +1,4 @@
-"""``shift-mesh doctor``: is everything reachable, and if not, why."""
+"""``shift-mesh doctor``: check whether every part of the mesh can be reached, and say why not."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import typer
 
 
 class Finding(NamedTuple):
-    """One thing looked at."""
+    """The result of one check."""
 
     what: str
     fine: bool
@@ -27,7 +27,7 @@ def doctor(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
 ) -> None:
-    """Is everything reachable, and if not, why. Exit code 1 when something is not.
+    """Check whether every part of the mesh can be reached, and say why not. The exit code is 1 if a check fails.
 
     \b
     shift-mesh doctor
@@ -74,25 +74,25 @@ def _services(url: str) -> tuple[dict[str, Any], list[Finding]]:
         return {}, [Finding("gateway", False, e.detail)]
     services = ready.get("services")
     if not isinstance(services, dict):
-        return {}, [Finding("gateway", False, f"what answers at {url} is no gateway; give the right one with --url")]
+        return {}, [Finding("gateway", False, f"the server at {url} is not a gateway; give its address with --url")]
     return ready, [Finding(s, condition == "ready", str(condition)) for s, condition in services.items()]
 
 
 def _links(ready: dict[str, Any]) -> list[Finding]:
-    """Each pair of services of which one does not reach the other."""
+    """Return a finding for each pair of services of which one does not reach the other."""
     return [Finding("link", False, str(sentence)) for sentence in ready.get("links", ())]
 
 
 def _folder(given: Path | None, ready: dict[str, Any]) -> Finding:
-    """The folder that the mesh uses; without a mesh, the one that is given."""
+    """Return whether the data folder can be used: that of the mesh, or the given one without a mesh."""
     known = sorted(set(ready.get("data", {}).values()))
     if given is not None and known and str(given.absolute()) not in known:
-        return Finding("data folder", False, f"the mesh uses {' and '.join(known)}, not {given}; leave --data out")
+        return Finding("data folder", False, f"the mesh uses {' and '.join(known)}, not {given}; omit --data")
     data = given or Path(known[0] if known else "data")
     if known and not data.exists():
         return Finding("data folder", True, f"{data}, which is not on this machine (a container's, perhaps)")
     if not data.exists():
-        return Finding("data folder", False, f"{data} is not there; shift-mesh up makes it, or give --data")
+        return Finding("data folder", False, f"{data} does not exist; shift-mesh up makes it, or use --data")
     if not os.access(data, os.W_OK):
         return Finding("data folder", False, f"{data} is read-only")
     room = os.statvfs(data)

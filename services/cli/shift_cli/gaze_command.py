@@ -1,4 +1,4 @@
-"""``shift-mesh gaze play``: a recording of an eye tracker, streamed in as if it were live."""
+"""``shift-mesh gaze play``: stream a recording of an eye tracker as if it were live."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def play(
 ) -> None:
     """Stream a recording of an eye tracker into a session, with its own timing.
 
-    Prints rate, duration, and which share of the samples is lost and off the stimulus. Exit code 1 where nothing of
-    the gaze counted: none of it was dwell on an AOI.
+    The command prints the rate, the duration, and the shares of samples that are lost or off the stimulus. The exit
+    code is 1 if none of the gaze counted, because no sample was dwell on an AOI.
 
     \b
     shift-mesh gaze play trial1.tsv.gz --session s1
@@ -69,7 +69,7 @@ def play(
 
 
 class Described(NamedTuple):
-    """What a recording holds; shares are of its samples, 0..1."""
+    """A description of a recording; shares are of its samples, 0..1."""
 
     rate_hz: float
     length_s: float
@@ -79,7 +79,7 @@ class Described(NamedTuple):
 
 
 def describe(found: Sequence[Sample]) -> Described:
-    """Return rate, length and shares of a recording's samples, and a sentence of them."""
+    """Return rate, length and shares of a recording's samples, and a sentence about them."""
     length_s = found[-1].t - found[0].t
     rate_hz = (len(found) - 1) / length_s if length_s > 0 else 0.0
     points = [(s.x, s.y) for s in found if s.valid and s.x is not None and s.y is not None]
@@ -95,7 +95,7 @@ def describe(found: Sequence[Sample]) -> Described:
 def _stream(
     shift: RestClient, session: str, found: list[Sample], source: str, name: str, speed: float
 ) -> list[str]:  # fmt: skip
-    """Send the samples, each when its time has come; the warnings of the last answer and of restarts."""
+    """Send each sample at its time; return the warnings of the last answer and of restarts."""
     from rich.console import Console
     from rich.progress import Progress
     from shift_sources.files.samples import chunks
@@ -116,7 +116,7 @@ def _stream(
 
 
 def _nothing_counted(said: Described, before: dict[str, Any], after: dict[str, Any]) -> str:
-    """Why no dwell on an AOI came of it; empty where some did, or where the session does not tell."""
+    """Return why the gaze had no dwell on an AOI; empty if it had some, or if the session does not say."""
     if said.lost == 1.0:
         return "every sample is lost"
     if said.lost + said.off_stimulus == 1.0:
@@ -129,6 +129,6 @@ def _nothing_counted(said: Described, before: dict[str, Any], after: dict[str, A
 
 
 def _source_of(file: Path) -> str:
-    """A name for this play: a source's chunks are numbered from 0, so a second play is another source."""
+    """Return a name for this run: the chunks of a source are numbered from 0, so a second run is another source."""
     stem = re.sub(r"[^A-Za-z0-9_-]", "-", file.name.split(".")[0])[:40].lstrip("-_") or "file"
     return f"{stem}-{secrets.token_hex(3)}"

@@ -1,4 +1,4 @@
-"""``shift-mesh info``: what a recording says of itself."""
+"""``shift-mesh info``: summarise a recording."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def info(
     file: Annotated[Path, typer.Argument(help="The recording.", exists=True, dir_okay=False, envvar="SHIFT_FILE")],
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
 ) -> None:
-    """Show whose recording it is, how long, how many messages of what, and whether it is whole.
+    """Show the session of a recording, its length, its messages by kind, and whether it is complete.
 
-    Exit code 1 where it is damaged, holds no messages or is not what its checksum says.
+    The exit code is 1 if the recording is damaged, has no messages or does not match its checksum.
 
     \b
     shift-mesh info data/recordings/s1.mcap

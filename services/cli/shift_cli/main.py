@@ -1,4 +1,4 @@
-"""``shift-mesh``: the command line. Every flag is an environment variable too (``SHIFT_PORT``).
+"""``shift-mesh``: the command line. Every option is also an environment variable (``SHIFT_PORT``).
 
 Heavy modules are imported by the command that needs them, so that ``--help`` answers at once. ``entry`` turns every
 error into one sentence and an exit code.
@@ -50,7 +50,7 @@ def shift_mesh(
 ) -> None:
     """How should the robot phrase its next explanation for this person, now?
 
-    Exit codes: 0 fine, 1 what was checked is not so, 2 wrong use or it could not be done, 130 after Ctrl-C.
+    Exit codes: 0 success, 1 a check failed, 2 wrong use or the command could not be carried out, 130 after Ctrl-C.
 
     \b
     shift-mesh up --demo          # run the mesh here, with a simulated person

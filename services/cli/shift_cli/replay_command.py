@@ -1,4 +1,4 @@
-"""``shift-mesh replay``: a recording on the bus again, under a session of its own."""
+"""``shift-mesh replay``: publish a recording again, in a session of its own."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def replay(
         str, typer.Option(help="Endpoint of the mesh's router.", envvar="SHIFT_ZENOH")
     ] = "tcp/127.0.0.1:7447",
 ) -> None:
-    """Publish a recording's messages again, each in its time, marked as a replay.
+    """Publish the messages of a recording again, with their own timing, marked as a replay.
 
-    No service applies what is replayed: a replayed reward never reaches a learner. On a terminal, p or
-    space pauses and goes on; Ctrl-C ends.
+    No service applies replayed messages, so a replayed reward never reaches a learner. On a terminal, p or space
+    pauses and continues; Ctrl-C ends the replay.
 
     \b
     shift-mesh replay data/recordings/s1.mcap
@@ -64,7 +64,7 @@ def replay(
 
 
 def _check_plan(plan: Replay, extent: Extent) -> None:
-    """Refuse the recorded session's own name, and say how much the shortened pauses leave out."""
+    """Refuse the name of the recorded session, and say how much time the shortened pauses leave out."""
     from shift_schemas.errors import Conflict
 
     if plan.session == extent.session:
@@ -78,7 +78,7 @@ def _check_plan(plan: Replay, extent: Extent) -> None:
 
 
 async def _run(plan: Replay, extent: Extent, zenoh: str, start_paused: bool) -> int:
-    """Replay until the end or Ctrl-C; how many messages."""
+    """Replay until the end or Ctrl-C, and return the number of messages."""
     import asyncio
     import contextlib
     import signal
@@ -117,7 +117,7 @@ async def _connected(bus: Any, zenoh: str) -> None:
 
 
 def _waiting_put(bus: Any) -> Publish:
-    """A replay has time: under load it waits for its listeners, where a live fact is only a hint and is dropped."""
+    """Return a function that waits for slow listeners: a replay has time, while a live notification can be dropped."""
     from functools import partial
 
     import zenoh
@@ -143,7 +143,7 @@ async def _playing(bus: Any, plan: Replay, extent: Extent, pacer: Pacer, counted
 
 
 def _keys(pacer: Pacer, playing: Any) -> Any:
-    """What is typed: keys on a terminal; else, where the replay waits to start, a line."""
+    """Return what the user types: keys on a terminal; otherwise one line, if the replay waits to start."""
     import contextlib
     import sys
 
@@ -184,7 +184,7 @@ def _terminal(pacer: Pacer) -> Any:
 
 
 def _line(pacer: Pacer, playing: Any) -> Any:
-    """A thread that waits for one line. At the end of the input nothing can start the replay: it ends."""
+    """Start a thread that waits for one line. The replay ends at the end of the input, as nothing can start it then."""
     import asyncio
     import contextlib
     import sys

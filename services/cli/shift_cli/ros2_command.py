@@ -32,8 +32,8 @@ def ros2(
     """Run the bridge to ROS 2 until Ctrl-C: a node with topics and a service, for robots.
 
     \b
-    shift-mesh ros2 --session s1                                          # begun by somebody else
-    shift-mesh ros2 --ros-args -p session:=s1 -p create_session:=true     # begun here, if need be
+    shift-mesh ros2 --session s1                                          # a session that exists
+    shift-mesh ros2 --ros-args -p session:=s1 -p create_session:=true     # start it if needed
     shift-mesh ros2 --backend rclpy --ros-args -r __ns:=/lab -r shift/gaze:=/tracker/gaze
     """
     flags = {"backend": backend, "session": session, "zenoh": zenoh, "ros_router": ros_router}

@@ -1,4 +1,4 @@
-"""The application: every REST path of INTERFACE.md, the live stream and the web page."""
+"""The application: every REST path (docs/interface.md), the live stream and the web page."""
 
 from __future__ import annotations
 

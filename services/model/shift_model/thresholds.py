@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 MARGIN = 1e-9
 """Chosen: a value this close to a threshold equals it. Values are sums of tenths and thirds, and rounding must not
-move such a sum to the other side of a threshold (MODEL.md)."""
+move such a sum to the other side of a threshold (docs/model.md)."""
 
 
 @overload

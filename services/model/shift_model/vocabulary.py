@@ -1,4 +1,4 @@
-"""The words of the messages, in their fixed order (INTERFACE.md, "Words on the wire").
+"""The words of the messages, in their fixed order (docs/interface.md).
 
 The order matters: a triple's index is ``15 * capacity + 5 * gaze + awareness``. Actions are every combination of the
 strategies' levels; the last strategy varies first.

@@ -1,6 +1,6 @@
 """Areas of interest: the area that a point falls on. Pure.
 
-Points are 0..1 from the upper left corner. Where areas overlap, the first one counts (INTERFACE.md).
+Points are 0..1 from the upper left corner. Where areas overlap, the first one counts (docs/interface.md).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How the time of a gaze source divides: lost, off the stimulus, in no fixation, on no AOI, on an AOI. Pure.
 
 Time is counted in integer nanoseconds on the source's clock, from its first sample on. The time between two samples
-is lost as far as the earlier one does not stand for it (MODEL.md, section 1). A jump forward counts as no time.
+is lost as far as the earlier one does not stand for it (docs/model.md). A jump forward counts as no time.
 """
 
 from __future__ import annotations

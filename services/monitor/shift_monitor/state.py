@@ -19,7 +19,7 @@ from shift_monitor.gaze_stream import GazeStream
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 
 CONFIG_WAIT_S = 0.2
-"""How long a message waits for the session's configuration, s (DESIGN.md, "Read your own writes")."""
+"""How long a message waits for the session's configuration, s (docs/design.md)."""
 
 UNSET_CAPACITY, UNSET_ATTENTION = Capacity(0.0), Attention(())
 """The values before the first configuration, which sets the start values."""

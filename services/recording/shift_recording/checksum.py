@@ -1,6 +1,6 @@
 """The checksum beside a finished recording, as ``sha256sum`` writes and checks it.
 
-It finds every flipped bit; of the checksums within an MCAP file, 15 to 36 % pass unseen (DESIGN.md).
+It finds every flipped bit. The checksums within an MCAP file alone miss 15 to 36 % of them (docs/design.md).
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ _LINE = re.compile(r"([0-9a-f]{64}) [ *].+\n?")
 
 
 class Checksum(Enum):
-    """What can be said of a recording that is not damaged."""
+    """The result of comparing an undamaged recording with its checksum file."""
 
     MATCHES = "matches"
     MISSING = "missing"
 
 
 def checksum_path(recording: Path) -> Path:
-    """``NAME.mcap.sha256``."""
+    """Return the path of the checksum file, ``NAME.mcap.sha256``."""
     return recording.with_name(f"{recording.name}.sha256")
 
 
 def sha256_of(path: Path) -> str:
-    """The file's SHA-256, in hex. Raises :class:`UnknownThing`, :class:`DamagedRecording` if it cannot be read."""
+    """Return the file's SHA-256 in hex. Raises :class:`UnknownThing`, else :class:`DamagedRecording` if unreadable."""
     try:
         with open(path, "rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
@@ -41,7 +41,7 @@ def sha256_of(path: Path) -> str:
 
 
 def write_checksum(recording: Path, sha256: str) -> Path:
-    """Writes the checksum file, durably and at once. Raises :class:`StorageFailed`."""
+    """Write the checksum file durably and atomically. Raises :class:`StorageFailed`."""
     target = checksum_path(recording)
     temporary = target.with_name(f".{target.name}.partial")
     file = DurableFile(temporary, new=False)
@@ -55,14 +55,14 @@ def write_checksum(recording: Path, sha256: str) -> Path:
 
 
 def check(recording: Path) -> Checksum:
-    """Compares a recording with the checksum beside it.
+    """Compare a recording with the checksum file beside it.
 
     Raises
     ------
     DamagedRecording
-        It differs; names the file, what was expected and what was found.
+        The checksum differs; the error names the file, the expected and the found value.
     UnknownThing
-        There is no such recording.
+        The recording does not exist.
     """
     found = sha256_of(recording)
     expected = _expected(checksum_path(recording))

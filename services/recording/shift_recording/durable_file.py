@@ -1,7 +1,7 @@
-"""Files that are on the disk when they say so, and errors that say what the disk said.
+"""Durable files: data is on the disk when ``sync`` returns, and errors repeat what the operating system reported.
 
-No file here has a buffer of its own: after a full disk there is nothing left behind that a later
-``close`` would try to write once more.
+The files have no buffer of their own, so after a full disk no data is left that a later ``close`` would
+try to write again.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from shift_schemas.errors import Unavailable
 
 
 class StorageFailed(Unavailable):
-    """The disk refused: full, read-only, over a limit or broken. Travels as ``unavailable`` (503)."""
+    """The disk is full, read-only, over a limit or broken. The error code is ``unavailable`` (503)."""
 
     title: ClassVar[str] = "The recording cannot be written"
 
 
 @contextlib.contextmanager
 def storage_errors(path: Path) -> Iterator[None]:
-    """Translates an ``OSError`` about ``path`` into :class:`StorageFailed`."""
+    """Translate an ``OSError`` about ``path`` into :class:`StorageFailed`."""
     try:
         yield
     except OSError as e:
@@ -31,18 +31,18 @@ def storage_errors(path: Path) -> Iterator[None]:
 
 
 class DurableFile:
-    """A file written from front to end; what was synced stays, what failed is cut off again.
+    """A file that is only appended to. Synced data stays; data after a failed write is cut off again.
 
-    Has the ``write``, ``tell`` and ``flush`` that an MCAP writer asks for.
+    It has the ``write``, ``tell`` and ``flush`` that an MCAP writer needs.
 
     Raises
     ------
     StorageFailed
-        From every method, where the disk refuses.
+        From every method, if the disk refuses a write.
     """
 
     def __init__(self, path: Path, *, new: bool) -> None:
-        """Opens ``path``: with ``new`` it must not be there yet (else ``FileExistsError``)."""
+        """Open ``path``; with ``new`` the file must not exist yet (else ``FileExistsError``)."""
         self.path = path
         self._written = 0
         self._synced = 0
@@ -55,7 +55,7 @@ class DurableFile:
             raise StorageFailed(f"{path} cannot be made: {e.strerror or e}") from e
 
     def write(self, data: bytes) -> int:
-        """Writes all of ``data``."""
+        """Write all of ``data``."""
         rest = memoryview(data)
         with storage_errors(self.path):
             while rest:
@@ -65,28 +65,28 @@ class DurableFile:
         return len(data)
 
     def tell(self) -> int:
-        """Bytes written so far."""
+        """Return the number of bytes written so far."""
         return self._written
 
     def flush(self) -> None:
-        """Nothing: there is no buffer. :meth:`sync` is what lasts."""
+        """Do nothing, since there is no buffer. Use :meth:`sync` for durability."""
 
     def sync(self) -> None:
-        """Returns when all that was written is on the disk."""
+        """Sync everything that was written to the disk."""
         if self._synced != self._written:
             with storage_errors(self.path):
                 os.fsync(self._fd)
             self._synced = self._written
 
     def cut_back(self) -> None:
-        """Cuts off what came after the last sync; as far as the disk still lets us."""
+        """Cut off what was written after the last sync, if the disk allows it."""
         with contextlib.suppress(OSError):
             os.ftruncate(self._fd, self._synced)
             os.lseek(self._fd, self._synced, os.SEEK_SET)
         self._written = self._synced
 
     def close(self) -> None:
-        """Closes it; a second time does nothing."""
+        """Close the file; a second call has no effect."""
         fd, self._fd = self._fd, -1
         if fd >= 0:
             with storage_errors(self.path):
@@ -94,7 +94,7 @@ class DurableFile:
 
 
 def make_folder(folder: Path) -> None:
-    """Makes ``folder`` with its parents, each entered durably in the one above."""
+    """Make ``folder`` and its parents; each entry in the parent folder is synced."""
     missing = [f for f in (folder, *folder.parents) if not f.exists()]
     with storage_errors(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -103,7 +103,7 @@ def make_folder(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Returns when the entries of ``folder`` (files made, renamed, removed) are on the disk."""
+    """Sync the entries of ``folder`` (files made, renamed, removed) to the disk."""
     with storage_errors(folder):
         fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
@@ -113,19 +113,19 @@ def sync_folder(folder: Path) -> None:
 
 
 def replace(temporary: Path, target: Path) -> None:
-    """Puts ``temporary``, already synced, in the place of ``target``, at once and for good."""
+    """Replace ``target`` by ``temporary``, which is synced already, atomically and durably."""
     with storage_errors(target):
         os.replace(temporary, target)
     sync_folder(target.parent)
 
 
 def write_durably(target: Path, data: bytes) -> None:
-    """Write a whole file: after this it has ``data``, also after a crash; before, it is as it was.
+    """Write a whole file atomically: after a crash it has either its old content or ``data``.
 
     Raises
     ------
     StorageFailed
-        The disk refuses.
+        The disk refuses the write; the old content stays.
     """
     make_folder(target.parent)
     temporary = target.with_name(f".{target.name}.partial")

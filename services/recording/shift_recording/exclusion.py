@@ -23,7 +23,7 @@ _LOCK = threading.Lock()
 
 
 class ExclusionEntry(BaseModel):
-    """One change: the recording is excluded, or it is not any more."""
+    """One change: the recording is excluded, or it is included again."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", str_strip_whitespace=True)
 
@@ -54,12 +54,12 @@ def exclusion_path(recording: Path) -> Path:
 
 
 def read_exclusion(recording: Path) -> Exclusion:
-    """Return the exclusions of a recording; without a file there is none.
+    """Return the exclusions of a recording; without a file the list is empty.
 
     Raises
     ------
     DamagedRecording
-        The file cannot be read, or a later version wrote it.
+        The file cannot be read, or a later version of shift-mesh wrote it.
     """
     path = exclusion_path(recording)
     try:
@@ -80,11 +80,11 @@ def add_entry(recording: Path, entry: ExclusionEntry) -> Exclusion:
     Raises
     ------
     UnknownThing
-        There is no such recording.
+        The recording does not exist.
     DamagedRecording
         The present file cannot be read; it is not overwritten.
     StorageFailed
-        The disk refuses.
+        The disk refuses the write.
     """
     if not recording.is_file():
         raise UnknownThing(f"there is no recording {recording.name}")

@@ -1,9 +1,9 @@
-"""Makes one recording of a session's segments when it ends.
+"""Merge the segments of a session into one recording when the session ends.
 
-Twice over the segments: first only to see where each message is, then to copy them in their new
-order, a chunk at a time; an hour of gaze needs no more memory than a minute. The recording takes its
-place at once, its checksum file after it; a crash in between leaves a recording without a checksum,
-never with a wrong one.
+The segments are read twice: first to find the place of each message, then to copy the messages in their new order,
+one chunk at a time, so that an hour of gaze needs no more memory than a minute. The recording is put in its place
+atomically, and then its checksum file. A crash in between leaves a recording without a checksum, never with a
+wrong one.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from shift_recording.mcap.records import Attachment, message_at
 from shift_recording.mcap.writer import SESSION_METADATA, RecordingWriter
 
 CHUNK_BYTES = 2 * 2**20
-"""Large chunks pack better and make short indexes; Foxglove fetches a chunk at a time. Chosen: 1 to 4 MB."""
+"""Bytes of an uncompressed chunk. Large chunks compress better and have short indexes; Foxglove loads whole chunks."""
 _CACHE_BYTES = 32 * 2**20
 _EVERY = 1000
 
 OnProgress = Callable[[int, int], None]
-"""Told now and then how many messages of how many are written."""
+"""Called from time to time with the number of written messages and their total."""
 Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class FinishedRecording:
-    """A recording in its place.
+    """A finished recording.
 
-    ``missing`` gives per owner the sequences, first and last, that no source had, counted from 1:
-    what its journal still has can be written to one more segment and finished again. ``sources``
-    says of each source whether it was read whole.
+    ``missing`` gives for each owner the first and the last sequence number, counted from 1, of each gap in all
+    sources. The owner's journal may still have these messages; they can be written to another segment, and the
+    recording can be merged again. ``sources`` says for each source whether it was read completely.
     """
 
     path: Path
@@ -64,32 +64,32 @@ def finish_recording(
     attachments: Iterable[Attachment],
     progress: OnProgress | None = None,
 ) -> FinishedRecording:
-    """Merges ``sources`` into the finished recording ``target``.
+    """Merge ``sources`` into the finished recording ``target``.
 
-    What is there twice, by topic and sequence, is written once, as it was recorded first. Messages
-    stay in the order in which they were recorded, but each owner's are in the order of its sequence:
-    one that was recorded late moves to before its successor. (Not by log_time: a clock can jump.)
-    A source that is cut off or damaged gives what came before; see ``sources`` of the result.
+    A message that is there twice, by topic and sequence, is written once, as it was recorded first. Messages stay in
+    the order in which they were recorded, and each owner's messages are in the order of its sequence: a message that
+    was recorded late moves to before its successor. The order does not use log_time, because a clock can jump.
+    A source that is cut off or damaged gives the messages before that place; see ``sources`` of the result.
 
     Parameters
     ----------
     sources
-        An earlier finished recording, if there is one, and the segments, oldest first.
+        An earlier finished recording, if it exists, and the segments, the oldest first.
     target
-        May be among the sources.
+        The file to write; it may be one of the sources.
     schemas
-        By subject (``mcap_schemas.subject_schemas``).
+        By subject, from :func:`shift_recording.mcap.schemas.subject_schemas`.
     metadata
         ``shift:session`` and ``shift:config``; the session's id is added to the former.
 
     Raises
     ------
     Conflict
-        A source belongs to another session, or is no recording of ours.
+        A source belongs to another session, or is not a recording of SHIFT.
     UnknownThing
-        A source is not there.
+        A source does not exist.
     StorageFailed
-        The disk refuses; ``target`` is as it was.
+        The disk refuses the write; ``target`` is unchanged.
     """
     index = _indexed(session, sources)
     order, missing = _order(index)
@@ -124,7 +124,7 @@ def finish_recording(
 
 @dataclass
 class _Index:
-    """Where each message is: columns in the order of recording, 16 bytes a message."""
+    """The place of each message: columns in the order of recording, 16 bytes a message."""
 
     sources: Sequence[Path]
     chunks: list[tuple[int, int]] = field(default_factory=list)  # source's number, offset
@@ -143,7 +143,7 @@ def _indexed(session: str, sources: Sequence[Path]) -> _Index:
     index = _Index(sources)
     for number, path in enumerate(sources):
         recording = Recording(path)
-        with suppress(DamagedRecording):  # the report has it
+        with suppress(DamagedRecording):  # the report says so
             _index_source(index, number, recording)
         _check_whose(session, recording)
         index.reports.append(recording.report)
@@ -171,7 +171,7 @@ def _index_source(index: _Index, number: int, recording: Recording) -> None:
 
 
 def _order(index: _Index) -> tuple[Ints, dict[str, tuple[tuple[int, int], ...]]]:
-    """The numbers of the messages to write, in their new order, and what each owner misses."""
+    """Return the numbers of the messages to write, in their new order, and the gaps of each owner."""
     topic = np.array(index.topic, dtype=np.int64)
     sequence = np.array(index.sequence, dtype=np.int64)
     runs, missing = [], {}
@@ -183,13 +183,13 @@ def _order(index: _Index) -> tuple[Ints, dict[str, tuple[tuple[int, int], ...]]]
         runs.append(run)
         if gaps := _gaps(sequence[run]):
             missing[owner] = gaps
-    # Recorded late: as early as the earliest of those that follow it.
+    # A message that was recorded late is placed as early as the earliest of its successors.
     places = [np.minimum.accumulate(run[::-1])[::-1] for run in runs]
     return np.concatenate(runs)[np.argsort(np.concatenate(places), kind="stable")], missing
 
 
 def _gaps(sequence: Ints) -> tuple[tuple[int, int], ...]:
-    """What is missing of 1, 2, 3 ... in a sorted column, as first and last."""
+    """Return the numbers missing from 1, 2, 3 ... in a sorted column, as the first and the last of each gap."""
     before = np.concatenate(([0], sequence))
     at = np.flatnonzero(np.diff(before) > 1)
     return tuple((int(before[i]) + 1, int(before[i + 1]) - 1) for i in at)
@@ -198,7 +198,7 @@ def _gaps(sequence: Ints) -> tuple[tuple[int, int], ...]:
 def _write_front(
     writer: RecordingWriter, metadata: Mapping[str, Mapping[str, str]], attachments: Iterable[Attachment]
 ) -> None:
-    """What a reader wants to know before the messages, and has of a cut off file too."""
+    """Write metadata and attachments before the messages, so that a file that is cut off has them too."""
     for name, values in metadata.items():
         writer.metadata(name, values)
     for attachment in attachments:
@@ -220,7 +220,7 @@ def _write_messages(writer: RecordingWriter, index: _Index, order: Ints, progres
 
 
 class _Chunks:
-    """Unpacked chunks of the sources; those used last are kept, up to ``_CACHE_BYTES``."""
+    """Unpacked chunks of the sources; the chunks used last are kept, up to ``_CACHE_BYTES``."""
 
     def __init__(self, index: _Index) -> None:
         self._index = index
@@ -228,7 +228,7 @@ class _Chunks:
         self._bytes = 0
 
     def content(self, number: int) -> bytes:
-        """The chunk of that number."""
+        """Return the chunk of that number."""
         found = self._kept.get(number)
         if found is not None:
             self._kept.move_to_end(number)
@@ -243,7 +243,7 @@ class _Chunks:
 
 
 def _put_in_place(temporary: Path, target: Path, sha256: str) -> None:
-    """No moment at which a checksum file stands beside another recording than its own."""
+    """Put the recording in its place, so that a checksum file never stands beside another recording than its own."""
     with storage_errors(target):
         checksum_path(target).unlink(missing_ok=True)
     sync_folder(target.parent)

@@ -1,6 +1,6 @@
-"""What stands in front of a recording's messages: whose it is, its configuration, the study, the policies. Pure.
+"""The metadata and attachments of a recording: session, configuration, study and policies. Pure.
 
-It repeats what the messages say, for people and programs that do not read them; ``verify`` compares the two.
+They repeat the messages for people and programs that do not read them; ``verify`` compares both.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ FORMAT_IN_METADATA = 3
 
 
 def metadata_of(fact: Session, config: Config) -> dict[str, dict[str, str]]:
-    """The metadata records, by name; stamps are seconds since the epoch, '' is none."""
+    """Return the metadata records by name; stamps are in seconds since the epoch, and '' means that there is none."""
     return {
         SESSION_METADATA: {
             "session": fact.session,
@@ -40,7 +40,7 @@ def metadata_of(fact: Session, config: Config) -> dict[str, dict[str, str]]:
 
 
 def attachments_of(config: Config, original: str, policies: tuple[bytes, bytes] | None) -> dict[str, bytes]:
-    """The attached JSON files, by name; ``policies`` are the first and the last one, as recorded."""
+    """Return the attached JSON files by name; ``policies`` are the first and the last one, as recorded."""
     table = json.loads(config.study)["scoring"]["table"]
     files = {STUDY: original.encode(), "scoring-table.json": json.dumps(table, indent=1).encode()}
     return files | dict(zip(("policy-first.json", "policy-last.json"), policies or (), strict=False))

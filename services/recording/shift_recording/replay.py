@@ -1,8 +1,8 @@
-"""Replay: a recording's facts on the bus again, at their own pace, under a session of its own.
+"""Replay: publish the facts of a recording again, with their own timing, in a session of their own.
 
-What is replayed is marked: the session's fact names the recording (``replay_of``), and each publication
-carries ``replay:SEQUENCE`` as its attachment, which the readers of services and doors pass over
-(``shift_runtime.reader``). So every tool that listens hears a replay, and no learner learns from it.
+A replay is marked: the session's fact names the recording (``replay_of``), and each publication carries
+``replay:SEQUENCE`` as its attachment. The readers of the services skip such publications (``shift_runtime.reader``).
+So every tool that listens receives a replay, and no learner learns from it.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from shift_recording.mcap.reader import RecordedFact, Recording, recorded_fact
 
 LONGEST_ID = 63
 LONGEST_PAUSE_S = 10.0
-"""Chosen: longer than the pauses of an interaction, and nobody waits through a step of the clock or a lunch break."""
+"""The longest pause, s: longer than the pauses of an interaction, but no user waits through a lunch break. A choice."""
 OnProgress = Callable[[float, int], None]
-"""Told the position in the recording, s, and how many facts were published."""
+"""Called with the position in the recording, s, and the number of published facts."""
 
 
 class Publish(Protocol):
-    """How a fact is put on a bus: :meth:`shift_runtime.bus.protocol.Bus.put`, or one that rather waits than drops."""
+    """Publishes a fact: :meth:`shift_runtime.bus.protocol.Bus.put`, or a function that waits instead of dropping."""
 
     def __call__(self, key: str, payload: bytes, /, *, encoding: str = "", attachment: bytes = b"") -> None:
-        """Publish."""
+        """Publish a fact."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """What to replay, and how.
+    """The parts of a recording to replay, and how to replay them.
 
     Raises
     ------
     MalformedMessage
-        Something of it cannot be.
+        A value is not valid.
     """
 
     path: Path
@@ -61,7 +61,7 @@ class Replay:
     """A longer pause of the recording is shortened to this; 0: none is."""
 
     def __post_init__(self) -> None:
-        """Check it."""
+        """Check the values."""
         if not is_id(self.session):
             raise MalformedMessage(not_an_id(self.session))
         if not 0 < self.rate <= 10_000:
@@ -77,9 +77,9 @@ class Replay:
 
 @dataclass(frozen=True)
 class Extent:
-    """Of a recording: whose it is, and how long it is on its time line, s.
+    """The session of a recording, and its length on its time line, s.
 
-    ``shortened`` counts the pauses that were longer than the longest one; ``left_out_s`` is what they were longer.
+    ``shortened`` counts the pauses above the longest allowed pause; ``left_out_s`` is the sum of what they exceed it.
     """
 
     session: str
@@ -90,7 +90,7 @@ class Extent:
 
 
 class TimeLine:
-    """Positions on a recording's time line, s, message after message. Long pauses are shortened."""
+    """The positions of a recording's messages on its time line, s. Long pauses are shortened."""
 
     def __init__(self, longest_pause_s: float) -> None:
         self._longest_ns = round(longest_pause_s * NS)
@@ -112,12 +112,12 @@ class TimeLine:
 
 
 class Pacer:
-    """Time that runs at a rate and can stand still.
+    """A clock with a rate that can be paused.
 
     Parameters
     ----------
     now
-        Seconds of a clock that only rises.
+        Returns the seconds of a monotonic clock.
     """
 
     def __init__(self, rate: float, now: Callable[[], float], paused: bool = False) -> None:
@@ -138,22 +138,22 @@ class Pacer:
         return self._at if self._since is None else self._at + (self._now() - self._since) * self._rate
 
     def toggle(self) -> None:
-        """Stand still, or go on from here."""
+        """Pause, or continue from this position."""
         self._at, self._since = self.position_s, (self._now() if self.paused else None)
         self._changed.set()
 
     def seek(self, position_s: float) -> None:
-        """Be at another position, paused or not as before."""
+        """Go to another position; a paused clock stays paused."""
         self._at, self._since = position_s, (None if self.paused else self._now())
         self._changed.set()
 
     def change_rate(self, rate: float) -> None:
-        """Run at another rate from here on."""
+        """Change the rate from this position on."""
         self.seek(self.position_s)
         self._rate = rate
 
     async def until(self, position_s: float) -> None:
-        """Return when the position is reached."""
+        """Wait until the position is reached."""
         while (left_s := position_s - self.position_s) > 0 or self.paused:
             self._changed.clear()
             wait = self._changed.wait()
@@ -167,20 +167,20 @@ class Pacer:
 
 
 def replay_session(recorded: str) -> str:
-    """A session id for a replay of ``recorded``: nobody else's."""
+    """Return an unused session id for a replay of ``recorded``."""
     tail = secrets.token_hex(3)
     return f"replay-{recorded[: LONGEST_ID - len('replay-') - len(tail) - 1]}-{tail}"
 
 
 def extent_of(path: Path, longest_pause_s: float = LONGEST_PAUSE_S) -> Extent:
-    """One pass over the recording.
+    """Return the extent of a recording after one pass over it.
 
     Raises
     ------
     DamagedRecording
-        It is damaged, or holds nothing.
+        The recording is damaged or has no messages.
     UnknownThing
-        There is no such file.
+        The file does not exist.
     """
     recording, line, length_s = Recording(path), TimeLine(longest_pause_s), 0.0
     topics = set()
@@ -194,7 +194,7 @@ def extent_of(path: Path, longest_pause_s: float = LONGEST_PAUSE_S) -> Extent:
 
 
 async def check_free(bus: Bus, session: str) -> None:
-    """Raise :class:`Conflict` where the mesh has a session of that name: a replay is never mixed into one."""
+    """Raise :class:`Conflict` if the mesh has a session of that name, because a replay must not mix with a session."""
     query = OutboxQuery(only=[session])
     replies = await bus.get(build_key(ServiceKey("recorder", "outbox")), encode(query), timeout_s=1.0)
     for reply in (r for r in replies if r.ok):
@@ -205,9 +205,9 @@ async def check_free(bus: Bus, session: str) -> None:
 async def play(
     put: Publish, replay: Replay, extent: Extent, pacer: Pacer, on_progress: OnProgress | None = None
 ) -> int:
-    """Publish the facts, each when its time has come; how many.
+    """Publish each fact at its time, and return their number.
 
-    Ends with the recording, or with ``loop`` only by being cancelled. Raises as :meth:`Recording.facts`.
+    It ends with the recording; with ``loop`` it ends only when it is cancelled. Raises as :meth:`Recording.facts`.
     """
     published = 0
     async for position_s, recorded in _timed(replay, extent, pacer):
@@ -219,7 +219,7 @@ async def play(
 
 
 async def _timed(replay: Replay, extent: Extent, pacer: Pacer) -> AsyncIterator[tuple[float, RecordedFact]]:
-    """The facts, each in its time."""
+    """Yield each fact at its time."""
     while True:
         pacer.seek(replay.start_offset_s)
         count = 0
@@ -254,7 +254,7 @@ def _publish(put: Publish, replay: Replay, recorded: RecordedFact) -> None:
 
 
 def replayed(fact: Fact, replay: Replay) -> Fact:
-    """The fact as its replay has it: of another session, which says what it replays."""
+    """Return the fact as it is replayed: it belongs to another session, which names the recording."""
     update = {"session": replay.session}
     if isinstance(fact, Session):
         update["replay_of"] = replay.path.name

@@ -1,8 +1,8 @@
-"""Segments: what the recorder appends to while a session lives, one file per life of the recorder.
+"""Segments: the files to which the recorder appends while a session is live, one for each run of the recorder.
 
-``{folder}/{session}/0001.mcap``, ``0002.mcap``, ... After a crash the next one begins, and
-``finishing`` makes one recording of them. A message is safe when :meth:`SegmentWriter.flush` has
-returned: mcap holds a chunk in memory until it is full, and its own flush does not fsync.
+The files are ``{folder}/{session}/0001.mcap``, ``0002.mcap``, ... After a crash the next one begins, and ``merging``
+makes one recording of them. A message is durable when :meth:`SegmentWriter.flush` has returned. The flush of the mcap
+library does not suffice: the library keeps a chunk in memory until it is full, and does not call fsync.
 """
 
 from __future__ import annotations
@@ -18,29 +18,29 @@ from shift_recording.durable_file import DurableFile, StorageFailed, make_folder
 from shift_recording.mcap.writer import SESSION_METADATA, RecordingWriter
 
 CHUNK_BYTES = 2**20
-"""A chunk ends here at the latest; with a flush each second it ends long before."""
+"""The largest size of a chunk, bytes; a flush each second usually ends it earlier."""
 
 
 def segments_of(folder: Path, session: str) -> list[Path]:
-    """The session's segments, oldest first. Raises :class:`MalformedMessage` for what is no id."""
+    """Return the session's segments, the oldest first. Raises :class:`MalformedMessage` if ``session`` is not an id."""
     found = _session_folder(folder, session).glob("*.mcap")
     return sorted((f for f in found if f.stem.isdecimal()), key=lambda f: int(f.stem))
 
 
 class SegmentWriter:
-    """A new segment of a session. Not for several threads at once.
+    """A new segment of a session. Use it from one thread at a time.
 
-    Once the disk has refused, the segment ends at its last flush and every call raises: what was
-    written since must be written again, to a new segment (``finishing`` drops what is there twice).
+    After the disk has refused a write, the segment ends at its last flush and every call raises. Messages written since
+    then must be written again to a new segment; ``merging`` drops messages that are there twice.
 
     Raises
     ------
     StorageFailed
-        From every method: disk full, read-only, over a limit.
+        From every method: the disk is full, read-only or over a limit.
     """
 
     def __init__(self, folder: Path, session: str, schemas: Mapping[str, bytes]) -> None:
-        """Makes the file, which says whose it is, durably."""
+        """Make the file durably; its metadata names the session."""
         parent = _session_folder(folder, session)
         make_folder(parent)
         self._file = _next_file(parent, segments_of(folder, session))
@@ -58,16 +58,16 @@ class SegmentWriter:
         return self._file.path
 
     def write(self, subject: str, sequence: int, log_time: int, publish_time: int, payload: bytes) -> None:
-        """Adds a message: its owner's sequence, when it was recorded and its stamp, both ns.
+        """Add a message: its owner's sequence number, the time of recording and its stamp, both in ns.
 
-        Raises also what ``RecordingWriter.message`` raises; the segment goes on without that message.
+        Raises also what ``RecordingWriter.message`` raises; the segment continues without that message.
         """
         with self._refusals():
             self._writer.message(subject, sequence, log_time, publish_time, payload)
             self._pending += 1
 
     def flush(self) -> int:
-        """Returns when every message is on the disk; how many of them were not before."""
+        """Sync every message to the disk, and return how many were not synced before."""
         with self._refusals():
             self._writer.close_chunk()
             self._file.sync()
@@ -75,14 +75,14 @@ class SegmentWriter:
         return flushed
 
     def finish(self) -> None:
-        """Makes it a whole file, with index and footer, and closes it."""
+        """Write the index and the footer, and close the file."""
         with self._refusals():
             self._writer.finish()
             self._file.sync()
             self._file.close()
 
     def abandon(self) -> None:
-        """Closes it as it is: all that was flushed can be read."""
+        """Close the file as it is; everything that was flushed can be read."""
         self._file.close()
 
     @contextlib.contextmanager

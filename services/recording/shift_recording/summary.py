@@ -1,4 +1,4 @@
-"""What a recording says of itself, without deriving anything."""
+"""Summarise a recording without deriving any message again."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from shift_recording.mcap.writer import SESSION_METADATA
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """One recording.
+    """The summary of one recording.
 
-    ``complete`` is whether the session ended and the file is whole; ``reason`` says why it is not, or how
-    it is damaged. ``duration_s`` is from the session's start to its end; of one that has not ended, from the first
-    message's recording to the last one's. ``gaze_samples`` are those of all chunks of gaze.
+    ``complete`` says whether the session ended and the file is whole; ``reason`` says why it is not, or how it is
+    damaged. ``duration_s`` is the time from the session's start to its end; if it has not ended, the time from the
+    first recorded message to the last one. ``gaze_samples`` counts the samples of all chunks of gaze.
     """
 
     file: str
@@ -50,7 +50,7 @@ class RecordingInfo:
     reason: str
 
     def as_json(self) -> dict[str, Any]:
-        """For ``--json``; the study's text, long and among the attachments, is left out."""
+        """Return the summary for ``--json``, without the study's text, which is long and is among the attachments."""
         metadata = {name: {k: v for k, v in values.items() if k != "study" or name == SESSION_METADATA}
                     for name, values in self.metadata.items()}  # fmt: skip
         return asdict(self) | {"metadata": metadata}
@@ -58,7 +58,7 @@ class RecordingInfo:
 
 @dataclass
 class _Scanned:
-    """What one pass finds."""
+    """The result of one pass over the file."""
 
     counts: Counter[str]
     first: int = 0
@@ -68,12 +68,12 @@ class _Scanned:
 
 
 def info_of(path: Path) -> RecordingInfo:
-    """Read a recording once. One that is damaged or cut off is told of as far as it can be read.
+    """Read a recording once. A damaged or truncated recording is summarised as far as it can be read.
 
     Raises
     ------
     UnknownThing
-        There is no such file.
+        The file does not exist.
     """
     checksum = _checksum(path)
     recording = Recording(path)
@@ -135,5 +135,5 @@ def _duration_s(fact: Session | None, scanned: _Scanned) -> float:
 
 
 def _iso(ns: int) -> str:
-    """UTC, milliseconds."""
+    """Return a time in ns as ISO 8601, UTC, with milliseconds."""
     return datetime.fromtimestamp(ns / NS, UTC).isoformat(timespec="milliseconds")

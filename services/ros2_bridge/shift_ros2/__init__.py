@@ -1,1 +1,1 @@
-"""The other door: SHIFT as a ROS 2 node, with and without ROS installed (docs/ros2.md)."""
+"""SHIFT as a ROS 2 node, with and without an installation of ROS (docs/ros2.md)."""

@@ -6,7 +6,7 @@ from shift_ros2.service import run_bridge
 
 
 def main() -> None:
-    """Run it."""
+    """Run the bridge."""
     run_bridge(sys.argv[1:])
 
 

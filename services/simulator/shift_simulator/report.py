@@ -57,7 +57,7 @@ def print_learners(result: dict[str, Any], console: Console) -> None:
 
 def print_criterion(criterion: list[Point], console: Console) -> None:
     """Print the verdict on each point, and advice if one fails."""
-    table = Table("criterion", "verdict", "detail", title="Criterion (MODEL.md, section 5)")
+    table = Table("criterion", "verdict", "detail", title="Criterion (docs/model.md)")
     for point in criterion:
         verdict = "[green]holds[/]" if point["passed"] else "[red]fails[/]"
         table.add_row(point["point"], verdict, point["detail"])

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def merge_patch(target: Any, patch: Any) -> Any:
-    """RFC 7386: ``patch`` over ``target``; null removes. Neither is changed."""
+    """Return ``target`` after the merge patch (RFC 7386); null removes a key. Both arguments stay unchanged."""
     if not isinstance(patch, dict):
         return patch
     merged = dict(target) if isinstance(target, dict) else {}

@@ -96,14 +96,14 @@ class AwarenessRows(StudyPart):
 
 
 class ScoringTable(StudyPart):
-    """Table I of the paper: for each category, how much it speaks for each strategy."""
+    """Table I of the paper: for each category, its score for each strategy."""
 
     capacity: CapacityRows
     gaze: GazeRows
     awareness: AwarenessRows
 
     def rows(self, triple: Triple) -> tuple[Row, Row, Row]:
-        """The three rows of a triple."""
+        """Return the three rows of a triple."""
         return (
             getattr(self.capacity, triple.capacity),
             getattr(self.gaze, triple.gaze),
@@ -112,10 +112,10 @@ class ScoringTable(StudyPart):
 
 
 class ScoringSettings(StudyPart):
-    """The scoring system (paper, section III-C). Parts that are left out stay as the default has them.
+    """The scoring system (paper, section III-C). Parts that are left out have their defaults.
 
-    A strategy set to null is taken out; one more is a strategy more, and a column more in the table.
-    The actions follow the strategies as listed where the default ones are all named, else as here.
+    A strategy that is set to null is removed. A further strategy needs a further column in the table. The actions have
+    the order of the listed strategies if all default strategies are named, and the default order otherwise.
     """
 
     strategies: dict[Level, StrategySettings] = Field(
@@ -153,7 +153,7 @@ class ScoringSettings(StudyPart):
         return self
 
     def _wrong_cells(self) -> list[tuple[tuple[str, ...], str, str]]:
-        """Path, what stands there, and rule of each cell that is missing or belongs to no strategy of the study."""
+        """Yield path, value and rule of each cell that is missing or belongs to no strategy of the study."""
         cells: list[tuple[tuple[str, ...], str, str]] = []
         names = ", ".join(self.strategies)
         for part in ScoringTable.model_fields:
@@ -173,21 +173,21 @@ class ScoringSettings(StudyPart):
 
     @cached_property
     def choices(self) -> tuple[dict[str, str], ...]:
-        """Every action as it is said on the wire."""
+        """Every action as messages carry it."""
         return tuple(self.strategy(action) for action in self.actions)
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """The cognitive states, one per action and in the actions' order: each *is* its action."""
+        """The cognitive states, one per action and in the order of the actions: each *is* its action."""
         return tuple(cognitive_state_name(action) for action in self.actions)
 
     def strategy(self, action: tuple[str, ...]) -> dict[str, str]:
-        """An action as it is said on the wire: ``{"negation": "affirmation", "hesitation": "none"}``."""
+        """Return an action as messages carry it: ``{"negation": "affirmation", "hesitation": "none"}``."""
         return dict(zip(self.strategies, action, strict=True))
 
 
 def _columns(table: dict[str, dict[str, dict[str, float]]], strategies: Any) -> dict[str, Any]:
-    """The default table with the columns that the strategies still have."""
+    """Return the default table with the columns of the remaining strategies."""
     return {
         part: {category: {s: v for s, v in row.items() if s in strategies} for category, row in rows.items()}
         for part, rows in table.items()

@@ -1,6 +1,6 @@
 """The study file: what a researcher configures.
 
-What may be left out, the ranges, and what can change while a session runs stand in docs/interface.md, "Study file".
+Defaults, ranges and the settings that can change while a session runs: docs/interface.md, "Study file".
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from shift_study.scoring_table import ScoringSettings
 
 
 class Study(StudyPart):
-    """A study, whole."""
+    """A complete study."""
 
     study: Id = Field(description="The study's id.")
     title: Annotated[str, Field(max_length=500)] = Field(default="", description="For people.")
@@ -104,7 +104,7 @@ class Study(StudyPart):
 
     @property
     def aoi_names(self) -> tuple[str, ...]:
-        """The AOIs' names in the study's order."""
+        """The names of the AOIs in the study's order."""
         return tuple(a.name for a in self.aois)
 
 
@@ -128,7 +128,7 @@ CHANGEABLE: frozenset[str] = frozenset(
 
 
 def fixed_changes(before: Study, after: Study) -> tuple[str, ...]:
-    """The names of what differs between two studies and must not change while a session runs."""
+    """Return the names of settings that differ between two studies and must not change while a session runs."""
     names = [n for n in Study.model_fields if n not in CHANGEABLE and getattr(before, n) != getattr(after, n)]
     if before.learner.name != after.learner.name:
         names.append("learner.name")

@@ -12,7 +12,7 @@ from shift_schemas.messages import OutboxPage
 from shift_schemas.registry import OWNERS, READS
 
 END_WAIT_S = 3.5
-"""How long an end waits for the other services; shorter than the gateway waits, so that the client is told why."""
+"""How long an end waits for the other services, s; the gateway waits longer, so that the client receives the reason."""
 ASK_AGAIN_S = 0.02
 PEERS = tuple(owner for owner in OWNERS if owner != SESSION_OWNER)
 """The services that must have caught up."""
@@ -60,7 +60,7 @@ class Convergence:
     def missing(self, session: str, counts: Mapping[str, int]) -> tuple[str, ...]:
         """Return the owners of whom a recording with so many messages per subject lacks something."""
         heads = {owner: page.heads[session] for owner, page in self._pages(session).items()}
-        heads[SESSION_OWNER] += 1  # the recording has a version of the end of its own
+        heads[SESSION_OWNER] += 1  # the recording has its own version of the end
         recorded = {owner: sum(counts.get(subject, 0) for subject in OWNERS[owner]) for owner in OWNERS}
         return tuple(owner for owner in OWNERS if recorded[owner] != heads[owner])
 

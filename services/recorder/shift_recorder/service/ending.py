@@ -35,7 +35,7 @@ log = structlog.get_logger()
 
 
 Enqueue = Callable[[PendingRequest | Callable[[], None]], None]
-"""Puts a request or a function before the worker, behind everything that has arrived."""
+"""Passes a request or a function to the worker, after everything that has arrived."""
 
 
 class SessionEndProtocol:

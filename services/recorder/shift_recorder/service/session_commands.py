@@ -14,7 +14,7 @@ from shift_schemas.errors import Unavailable
 from shift_schemas.messages import Message, StartSession
 
 LEAST_FREE_BYTES = 64 * 2**20
-"""No session starts with less room than this on the disk; chosen: an hour of 300 Hz gaze and its journals."""
+"""The free space without which no session starts, bytes: an hour of gaze at 300 Hz and its journals. A choice."""
 
 
 @lru_cache(maxsize=1)

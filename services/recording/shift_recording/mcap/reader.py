@@ -1,9 +1,9 @@
-"""Reads recordings: finished, unfinished, cut off anywhere, or damaged.
+"""Read recordings that are finished, unfinished, cut off at any byte, or damaged.
 
-One streaming pass that checks every checksum. A file that merely ends too early gives what came
-before, and :attr:`Recording.report` says so; a file that contradicts itself raises
-:class:`DamagedRecording` at that point, after messages that were right. Nothing else is raised, and
-memory stays bounded whatever the file claims (RELIABILITY.md, rows 13-15).
+The reader makes one streaming pass and checks every checksum. If a file ends too early, the messages before its end
+are valid, and :attr:`Recording.report` says that it is incomplete. If a file contradicts itself, the reader raises
+:class:`DamagedRecording` at that position, after valid messages. It raises nothing else, and its memory is bounded
+for any content (docs/reliability.md).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MAXIMUM_HELD = 4 * 2**20
 
 
 class RecordedMessage(NamedTuple):
-    """A message of a recording. Times in ns since the epoch; ``sequence`` is the owner's, modulo 2^32."""
+    """A recorded message. Times are in ns since the epoch; ``sequence`` is the owner's number modulo 2^32."""
 
     topic: str
     sequence: int
@@ -39,7 +39,7 @@ class RecordedMessage(NamedTuple):
 
 
 class RecordedFact(NamedTuple):
-    """A fact of a recording, with its owner's sequence and when it was recorded, ns."""
+    """A recorded fact, its owner's sequence number and the time when it was recorded, ns since the epoch."""
 
     sequence: int
     log_time: int
@@ -47,7 +47,7 @@ class RecordedFact(NamedTuple):
 
 
 class Located(NamedTuple):
-    """A message and where it is: its chunk's offset in the file, its position in the unpacked chunk."""
+    """A message and its place: the offset of its chunk in the file, and its position in the unpacked chunk."""
 
     chunk: int
     position: int
@@ -56,7 +56,7 @@ class Located(NamedTuple):
 
 @dataclass(frozen=True)
 class Report:
-    """How far a file could be read, and why not further."""
+    """How far a file could be read, and why reading stopped there."""
 
     complete: bool
     damaged: bool = False
@@ -66,18 +66,18 @@ class Report:
 
 
 class Recording:
-    """A recording file. What it holds besides messages is known as far as it has been read.
+    """A recording file. Its schemas, metadata and attachments are known as far as it has been read.
 
     Attributes
     ----------
     schemas : dict[str, bytes]
         By topic.
     metadata : dict[str, dict[str, str]]
-        By name; it stands in front of the messages.
+        By name; the metadata stands before the messages.
     attachments : dict[str, Attachment]
-        By name; they stand in front of the messages.
+        By name; the attachments stand before the messages.
     report : Report
-        After a pass: whether it was complete.
+        After a pass: whether the file is complete.
     """
 
     def __init__(self, path: Path) -> None:
@@ -96,28 +96,28 @@ class Recording:
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """The topics that the file declares, with messages or without."""
+        """The topics that the file declares, including topics without messages."""
         return tuple(dict.fromkeys(channel.topic for channel in self._channels.values()))
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[RecordedMessage]:
-        """The messages in the file's order, all or those of ``topics``. Each call is a new pass.
+        """Yield the messages in the file's order: all of them, or those of ``topics``. Each call is a new pass.
 
         Raises
         ------
         DamagedRecording
-            Where the file contradicts itself; what came before was right.
+            The file contradicts itself; the messages before this position are valid.
         UnknownThing
-            There is no such file.
+            The file does not exist.
         """
         return (located.message for located in self.located(topics))
 
     def facts(self, topics: Collection[str] | None = None) -> Iterator[RecordedFact]:
-        """The messages as the facts that they are. Raises as :meth:`messages`, also for a payload that is none."""
+        """Yield the messages as facts. Raises as :meth:`messages` does, and for a payload that is not a valid fact."""
         for message in self.messages(topics):
             yield recorded_fact(self.path, message)
 
     def located(self, topics: Collection[str] | None = None) -> Iterator[Located]:
-        """As :meth:`messages`, with where each of them is."""
+        """Yield the messages as :meth:`messages` does, each with its place."""
         self._clear()
         scan: Scan | None = None
         try:
@@ -194,15 +194,15 @@ class Recording:
 
 
 def facts(path: Path) -> Iterator[RecordedFact]:
-    """The facts of the recording at ``path``, in its order; see :meth:`Recording.facts`.
+    """Yield the facts of the recording at ``path`` in the order of the file; see :meth:`Recording.facts`.
 
-    Of a file that is cut off these just end; where that matters, ask the :class:`Recording`.
+    For a file that is cut off, the iteration simply ends. If you need to know, use :attr:`Recording.report`.
     """
     return Recording(path).facts()
 
 
 def recorded_fact(path: Path, m: RecordedMessage) -> RecordedFact:
-    """Return the fact that a message of the recording at ``path`` is. Raises :class:`DamagedRecording`."""
+    """Return a recorded message as a fact; ``path`` is for the error. Raises :class:`DamagedRecording`."""
     try:
         return RecordedFact(m.sequence, m.log_time, fact_of(m.topic, m.data))
     except MalformedMessage as e:
@@ -210,7 +210,7 @@ def recorded_fact(path: Path, m: RecordedMessage) -> RecordedFact:
 
 
 def fact_of(topic: str, data: bytes) -> Fact:
-    """The fact that a recorded message is. Raises :class:`MalformedMessage`."""
+    """Return a recorded message as a fact. Raises :class:`MalformedMessage`."""
     kind = FACTS.get(topic)
     if kind is None:
         raise MalformedMessage(f"{shorten(topic)!r} is no subject")
@@ -220,7 +220,7 @@ def fact_of(topic: str, data: bytes) -> Fact:
 
 
 def chunk_at(path: Path, offset: int) -> bytes:
-    """The unpacked chunk at an offset that :meth:`Recording.located` gave. Raises :class:`DamagedRecording`."""
+    """Return the unpacked chunk at an offset from :meth:`Recording.located`. Raises :class:`DamagedRecording`."""
     try:
         with open(path, "rb") as stream:
             stream.seek(offset)
@@ -233,7 +233,7 @@ def chunk_at(path: Path, offset: int) -> bytes:
 
 @cache
 def _nullable(kind: type[Fact]) -> tuple[str, ...]:
-    """Fields that must be there and may be ``None``: a recording leaves them out."""
+    """Return the required fields that may be ``None``; a recording leaves them out when they are."""
     fields = kind.model_fields.items()
     return tuple(n for n, f in fields if f.is_required() and NoneType in get_args(f.annotation))
 

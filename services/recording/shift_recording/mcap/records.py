@@ -1,8 +1,8 @@
-"""MCAP records from bytes that cannot be trusted.
+"""Parse MCAP records from untrusted bytes.
 
-Pure. Every length is checked against what is there *before* anything is made of it, and every record
-must fill its length exactly: of a flipped bit in a length, other readers skip what follows. All that
-goes wrong is a :class:`DamagedRecording`. Format: https://mcap.dev/spec.
+Pure. Every length is checked against the available bytes *before* it is used, and every record must fill its length
+exactly: other readers skip the following data where a bit of a length is flipped. Every error is a
+:class:`DamagedRecording`. Format: https://mcap.dev/spec.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ CHUNK_INDEX, ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX 
 SUMMARY_OFFSET, DATA_END = 14, 15
 
 MAXIMUM_BYTES = 32 * 2**20
-"""Of a chunk, packed or unpacked, and of an attachment. We write 4 MB; a reader holds two such things."""
+"""Bytes of a chunk, packed or unpacked, and of an attachment. SHIFT writes 4 MB; a reader holds two of them."""
 MAXIMUM_SMALL_BYTES = 2**20
-"""Of any other record: a few bytes of it may become hundreds in memory."""
+"""Bytes of any other record; a few bytes of it can become hundreds in memory."""
 
 DATA_SECTION = {SCHEMA, CHANNEL, CHUNK, MESSAGE_INDEX, ATTACHMENT, METADATA, DATA_END}
-"""What may stand before the data's end. Messages outside chunks have no checksum: we neither write nor take them."""
+"""The records of the data section. Messages outside chunks have no checksum, so they are not written or accepted."""
 SUMMARY_SECTION = {
     SCHEMA, CHANNEL, STATISTICS, CHUNK_INDEX, ATTACHMENT_INDEX, METADATA_INDEX, SUMMARY_OFFSET, FOOTER,
 }  # fmt: skip
@@ -40,7 +40,7 @@ _FIXED = {FOOTER: 20, DATA_END: 4, SUMMARY_OFFSET: 17}
 
 
 class SchemaRecord(NamedTuple):
-    """A schema."""
+    """A schema record."""
 
     id: int
     name: str
@@ -49,7 +49,7 @@ class SchemaRecord(NamedTuple):
 
 
 class ChannelRecord(NamedTuple):
-    """A channel; its own metadata is not kept."""
+    """A channel record, without the channel's own metadata."""
 
     id: int
     schema_id: int
@@ -58,7 +58,7 @@ class ChannelRecord(NamedTuple):
 
 
 class MessageRecord(NamedTuple):
-    """A message; times in ns."""
+    """A message record; times are in ns since the epoch."""
 
     channel_id: int
     sequence: int
@@ -78,31 +78,31 @@ class Attachment:
 
 
 class Cursor:
-    """Takes one field after the other out of a record; never more than there is."""
+    """Reads the fields of a record one after the other, and never beyond its end."""
 
     def __init__(self, body: memoryview, what: str) -> None:
         self._body, self._what, self.at = body, what, 0
 
     def take(self, n: int) -> memoryview:
-        """The next ``n`` bytes."""
+        """Return the next ``n`` bytes."""
         if n > len(self._body) - self.at:
             raise DamagedRecording(f"a {self._what} claims more than its {len(self._body)} bytes")
         self.at += n
         return self._body[self.at - n : self.at]
 
     def number(self, n: int) -> int:
-        """An unsigned number of ``n`` bytes."""
+        """Return an unsigned integer of ``n`` bytes."""
         return int.from_bytes(self.take(n), "little")
 
     def text(self) -> str:
-        """A text after its length."""
+        """Return a string, which follows its length."""
         try:
             return str(self.take(self.number(4)), "utf-8")
         except UnicodeDecodeError as e:
             raise DamagedRecording(f"a {self._what} has a text that is not UTF-8") from e
 
     def mapping(self) -> dict[str, str]:
-        """A map of texts after its length."""
+        """Return a map of strings, which follows its length."""
         end = self.number(4) + self.at
         pairs = {}
         while self.at < end:
@@ -113,13 +113,13 @@ class Cursor:
         return pairs
 
     def end(self) -> None:
-        """The record must end here."""
+        """Raise :class:`DamagedRecording` unless the record ends here."""
         if self.at != len(self._body):
             raise DamagedRecording(f"a {self._what} has {len(self._body)} bytes and fills {self.at}")
 
 
 def check_head(opcode: int, length: int, allowed: set[int]) -> None:
-    """Refuses a record that cannot stand here or is larger than it may be."""
+    """Raise :class:`DamagedRecording` for a record that is not allowed here or is too large."""
     if opcode not in allowed:
         raise DamagedRecording(f"a record of kind {opcode} cannot stand here")
     most = MAXIMUM_BYTES if opcode in _LARGE else MAXIMUM_SMALL_BYTES
@@ -128,7 +128,7 @@ def check_head(opcode: int, length: int, allowed: set[int]) -> None:
 
 
 def records_in(content: bytes) -> Iterator[tuple[int, int, memoryview]]:
-    """Kind, position and body of each record in an unpacked chunk."""
+    """Yield kind, position and body of each record in an unpacked chunk."""
     view, at, size = memoryview(content), 0, len(content)
     while at < size:
         if size - at < HEAD.size:
@@ -142,7 +142,7 @@ def records_in(content: bytes) -> Iterator[tuple[int, int, memoryview]]:
 
 
 def message_of(body: memoryview) -> MessageRecord:
-    """A message."""
+    """Return the message record in ``body``."""
     if len(body) < _MESSAGE.size:
         raise DamagedRecording(f"a message of {len(body)} bytes is too short to be one")
     channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
@@ -150,14 +150,14 @@ def message_of(body: memoryview) -> MessageRecord:
 
 
 def message_at(content: bytes, position: int) -> MessageRecord:
-    """The message at a position that :func:`records_in` gave."""
+    """Return the message at a position from :func:`records_in`."""
     _, length = HEAD.unpack_from(content, position)
     start = position + HEAD.size
     return message_of(memoryview(content)[start : start + length])
 
 
 def header_of(body: memoryview) -> tuple[str, str]:
-    """Profile and library."""
+    """Return the profile and the library of a header record."""
     c = Cursor(body, "header")
     found = c.text(), c.text()
     c.end()
@@ -165,7 +165,7 @@ def header_of(body: memoryview) -> tuple[str, str]:
 
 
 def schema_of(body: memoryview) -> SchemaRecord:
-    """A schema."""
+    """Return the schema record in ``body``."""
     c = Cursor(body, "schema")
     found = SchemaRecord(c.number(2), c.text(), c.text(), bytes(c.take(c.number(4))))
     c.end()
@@ -173,7 +173,7 @@ def schema_of(body: memoryview) -> SchemaRecord:
 
 
 def channel_of(body: memoryview) -> ChannelRecord:
-    """A channel."""
+    """Return the channel record in ``body``."""
     c = Cursor(body, "channel")
     found = ChannelRecord(c.number(2), c.number(2), c.text(), c.text())
     c.mapping()
@@ -182,7 +182,7 @@ def channel_of(body: memoryview) -> ChannelRecord:
 
 
 def metadata_of(body: memoryview) -> tuple[str, dict[str, str]]:
-    """A metadata record: its name and values. It has no checksum of its own."""
+    """Return the name and the values of a metadata record, which has no checksum of its own."""
     c = Cursor(body, "metadata record")
     found = c.text(), c.mapping()
     c.end()
@@ -190,7 +190,7 @@ def metadata_of(body: memoryview) -> tuple[str, dict[str, str]]:
 
 
 def attachment_of(body: memoryview) -> Attachment:
-    """An attachment, checked against its checksum."""
+    """Return an attachment after checking its checksum."""
     c = Cursor(body, "attachment")
     log_time, _made = c.number(8), c.number(8)
     name, media_type = c.text(), c.text()
@@ -201,7 +201,7 @@ def attachment_of(body: memoryview) -> Attachment:
 
 
 def check_message_index(body: memoryview) -> None:
-    """An index must be one; what it says is not used."""
+    """Raise :class:`DamagedRecording` unless the record is a message index; its content is not used."""
     c = Cursor(body, "message index")
     c.number(2)
     c.take(c.number(4))
@@ -209,7 +209,7 @@ def check_message_index(body: memoryview) -> None:
 
 
 def chunk_content(body: memoryview) -> bytes:
-    """A chunk's records, unpacked, of the size that it says and checked against its checksum."""
+    """Return the unpacked records of a chunk after checking its size and its checksum."""
     c = Cursor(body, "chunk")
     c.take(16)  # the times of its first and last message
     size, crc = c.number(8), c.number(4)
@@ -250,9 +250,9 @@ def _lz4(packed: memoryview, size: int) -> bytes:
 _UNPACK: dict[str, Callable[[memoryview, int], bytes]] = {
     "zstd": _zstd, "lz4": _lz4, "": lambda packed, size: bytes(packed),
 }  # fmt: skip
-"""How a chunk is unpacked, to at most one byte more than it says."""
+"""The decompressors; each returns at most one byte more than the chunk's stated size."""
 
 
 def _check_crc(what: str, data: bytes | memoryview, crc: int) -> None:
-    if crc and crc != (found := zlib.crc32(data)):  # 0: it has none
+    if crc and crc != (found := zlib.crc32(data)):  # 0 means that there is no checksum
         raise DamagedRecording(f"the checksum of {what} is {crc:08x} and should be {found:08x}")

@@ -1,6 +1,6 @@
-"""The records of a file, one after the other: bounded, in the right section, with its checksums.
+"""Read the records of a file one after the other, with bounded memory, and check sections and checksums.
 
-The first half of reading: of what a record says this knows nothing.
+This is the first half of reading; it does not interpret the content of a record.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from shift_recording.mcap import records as p
 
 
 class CutOff(Exception):
-    """The file ends within what should be there: it was not finished, or was truncated."""
+    """The file ends too early: it was not finished, or it was truncated."""
 
 
 class Scan:
@@ -25,9 +25,9 @@ class Scan:
     Attributes
     ----------
     good : int
-        Up to this byte the file was right.
+        The file is valid up to this byte.
     in_summary : bool
-        The data is over: what comes only says again what was there.
+        The data section is over; the rest of the file only summarises it.
     """
 
     def __init__(self, stream: io.BufferedReader) -> None:
@@ -38,7 +38,7 @@ class Scan:
         self.in_summary = False
 
     def records(self) -> Iterator[tuple[int, int, memoryview]]:
-        """Offset, kind and body of each record. Raises :class:`CutOff`, :class:`DamagedRecording`, ``OSError``."""
+        """Yield offset, kind and body of each record. Raises :class:`CutOff`, :class:`DamagedRecording`, OSError."""
         self._magic()
         yield self._record({p.HEADER})
         while True:

@@ -1,10 +1,9 @@
-"""The recording's JSON schemas, one per subject, and a fact as it stands in a recording.
+"""The JSON schemas of a recording, one per subject, and the JSON form of a recorded fact.
 
-Pure. Foxglove and Lichtblick parse a schema into flat definitions and refuse the whole topic where it
-has ``$ref``, ``anyOf``, tuples, nested arrays, unions or an object without ``properties`` (their
-``parseJsonSchema``, which knows no ``additionalProperties``). So everything is inlined; of a map the
-names that the study gives are listed, with ``additionalProperties`` for the rest. PlotJuggler reads the
-messages themselves and takes whatever is valid JSON.
+Pure. Foxglove and Lichtblick parse a schema into flat definitions. They refuse a whole topic whose schema has
+``$ref``, ``anyOf``, tuples, nested arrays, unions or an object without ``properties`` (their ``parseJsonSchema``
+does not know ``additionalProperties``). So everything is inlined, and a map lists the names that the study gives,
+with ``additionalProperties`` for the rest. PlotJuggler reads the messages themselves and accepts any valid JSON.
 """
 
 from __future__ import annotations
@@ -21,32 +20,32 @@ from shift_study.study import Study
 
 Schema = dict[str, Any]
 Names = Mapping[str, Sequence[str]]
-"""Names that a map is known to have, by where it stands: ``observation.gaze.weights``."""
+"""The known names of a map, by its path: ``observation.gaze.weights``."""
 
 _KEPT = ("type", "description", "enum")
 
 
 def subject_schemas(study: Study | None = None, policy_states: Sequence[str] = ()) -> dict[str, bytes]:
-    """The ``jsonschema`` data of every subject, by subject.
+    """Return the ``jsonschema`` data of every subject.
 
     Parameters
     ----------
     study
-        Names AOIs, strategies and tasks; left out, maps list no names.
+        Gives the names of AOIs, strategies and tasks; without it, maps list no names.
     policy_states
-        The rows of the first policy, once there is one.
+        The rows of the first policy, if there is a policy already.
     """
     names = known_names(study, policy_states)
     return {subject: json.dumps(schema_of(subject, names)).encode() for subject in SUBJECTS}
 
 
 def schema_name(subject: str) -> str:
-    """``shift.Decision.v1``."""
+    """Return the name of a schema, such as ``shift.Decision.v1``."""
     return f"shift.{FACTS[subject].__name__}.{VERSION}"
 
 
 def known_names(study: Study | None, policy_states: Sequence[str] = ()) -> dict[str, Sequence[str]]:
-    """Which names each map is known to have."""
+    """Return the known names of each map."""
     names: dict[str, Sequence[str]] = {"session.counts": SUBJECTS, "policy.states": policy_states}
     if study is not None:
         strategies = tuple(study.scoring.strategies)
@@ -59,14 +58,14 @@ _STRATEGY_MAPS = (
     "estimate.scores", "estimate.suggested", "decision.strategy", "decision.scores", "decision.suggested",
     "decision.actions", "override.strategy", "transition.action", "policy.actions",
 )  # fmt: skip
-"""Maps with one entry per strategy; an array's items stand where the array does."""
+"""The paths of maps with one entry per strategy; the items of an array have the path of the array."""
 
 
 def schema_of(subject: str, names: Names) -> Schema:
-    """The schema of one subject: inlined, and without what the viewers refuse.
+    """Return the schema of one subject, inlined, and without what the viewers refuse.
 
-    A field that may be ``None`` has the type that it has otherwise and is not required, since
-    :func:`recorded_json` leaves it out; every other field is always written, hence required.
+    A field that may be ``None`` has its other type and is not required, because :func:`recorded_json` leaves
+    ``None`` out. Every other field is always written and is therefore required.
     """
     whole = _published_schema(subject)
     flat = _flat(whole, whole.get("$defs", {}), subject, names)
@@ -80,12 +79,12 @@ def _published_schema(subject: str) -> Schema:
 
 
 def recorded_json(fact: Fact) -> bytes:
-    """The fact as it stands in a recording: without its ``None`` fields."""
+    """Return the JSON of a recorded fact, without its ``None`` fields."""
     return fact.model_dump_json(exclude_none=True).encode()
 
 
 def _flat(node: Schema, definitions: Schema, at: str, names: Names) -> Schema:
-    """``node`` with references and ``X | None`` resolved; ``at`` is where it stands."""
+    """Return ``node`` with references and ``X | None`` resolved; ``at`` is its path."""
     node = _resolved(node, definitions)
     flat = {key: node[key] for key in _KEPT if key in node}
     match node["type"]:
@@ -103,7 +102,7 @@ def _flat(node: Schema, definitions: Schema, at: str, names: Names) -> Schema:
 
 
 def _resolved(node: Schema, definitions: Schema) -> Schema:
-    """The schema that ``node`` stands for; its own description goes before that of the type."""
+    """Return the schema to which ``node`` refers; the node's description replaces that of the type."""
     if _may_be_none(node):
         (inner,) = (option for option in node["anyOf"] if option.get("type") != "null")
     elif "$ref" in node:
@@ -115,7 +114,7 @@ def _resolved(node: Schema, definitions: Schema) -> Schema:
 
 
 def _value_in(node: Schema) -> Schema:
-    """What the values of a map are; pydantic puts it under the keys' pattern where keys are ids."""
+    """Return the schema of a map's values; pydantic puts it under the pattern of the keys if the keys are ids."""
     by_pattern: dict[str, Schema] = node.get("patternProperties", {})
     (value,) = by_pattern.values() or (node["additionalProperties"],)
     return value

@@ -1,7 +1,7 @@
-"""MCAP as SHIFT writes it: one ``json`` channel per subject, zstd chunks, every checksum on.
+"""Write MCAP: one ``json`` channel per subject, zstd chunks, and every checksum.
 
-Profile "", library ``shift-mesh/x.y``, non-zero schema ids. Segments and finished files are both
-written by :class:`RecordingWriter`; when a chunk ends and what a file is called is theirs.
+The profile is empty, the library is ``shift-mesh/x.y`` and schema ids are not zero. :class:`RecordingWriter` writes
+segments and finished files; its callers decide when a chunk ends and what the file is called.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from shift_recording.mcap.records import MAXIMUM_BYTES, MAXIMUM_SMALL_BYTES, Att
 from shift_recording.mcap.schemas import schema_name
 
 MAXIMUM_PAYLOAD = 8 * 2**20
-"""Bytes of one message; a door's limit is 256 KB, and a chunk must stay below what a reader takes."""
+"""Bytes of one message. The gateway accepts 256 KB, and a chunk must stay below the limit of the reader."""
 
 SESSION_METADATA = "shift:session"
 CONFIG_METADATA = "shift:config"
 
 
 def library() -> str:
-    """``shift-mesh/0.2.0``."""
+    """Return the name and the version of this program, such as ``shift-mesh/0.2.0``."""
     try:
         return f"shift-mesh/{version('shift-mesh')}"
     except PackageNotFoundError:
@@ -34,21 +34,21 @@ def library() -> str:
 
 
 class RecordingWriter:
-    """Writes one MCAP file, front to end. Not for several threads at once.
+    """Writes one MCAP file from its beginning to its end. Use it from one thread at a time.
 
     Parameters
     ----------
     file
-        Where to; stays the caller's to sync and close.
+        The file to write to; the caller syncs and closes it.
     schemas
-        The schema of each of the subjects (``mcap_schemas.subject_schemas``).
+        The schema of each subject, from :func:`shift_recording.mcap.schemas.subject_schemas`.
     chunk_bytes
-        A chunk ends when it is larger than this, uncompressed.
+        A chunk ends when its uncompressed size is larger than this.
     """
 
     def __init__(self, file: DurableFile, schemas: Mapping[str, bytes], chunk_bytes: int) -> None:
-        self._writer: Any = Writer(  # Any: mcap leaves half of its methods without types
-            file,  # type: ignore[arg-type]  # it asks for write, tell and flush only
+        self._writer: Any = Writer(  # Any: half of mcap's methods have no types
+            file,  # type: ignore[arg-type]  # it uses write, tell and flush only
             chunk_size=chunk_bytes,
             compression=CompressionType.ZSTD,
             enable_crcs=True,
@@ -63,16 +63,16 @@ class RecordingWriter:
         return channel
 
     def message(self, subject: str, sequence: int, log_time: int, publish_time: int, data: bytes) -> None:
-        """One message; ``sequence`` is its owner's and is kept modulo 2^32, times in ns.
+        """Write one message. ``sequence`` is its owner's number and is kept modulo 2^32; times are in ns.
 
-        All is checked first: a number that does not fit would leave half a record in the chunk.
+        Everything is checked first, because a number that does not fit would leave half a record in the chunk.
 
         Raises
         ------
         MalformedMessage
-            Unknown subject, a negative sequence, a time that is no unsigned 64 bit number.
+            The subject is unknown, the sequence is negative, or a time is not an unsigned 64 bit number.
         TooLarge
-            Above ``MAXIMUM_PAYLOAD``.
+            The payload is larger than ``MAXIMUM_PAYLOAD``.
         """
         channel = self._channels.get(subject)
         if channel is None:
@@ -85,22 +85,22 @@ class RecordingWriter:
         )
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """A metadata record. Raises :class:`TooLarge` above what a reader takes."""
+        """Write a metadata record. Raises :class:`TooLarge` above the limit of the reader."""
         size = sum(len(f"{key}{value}".encode()) + 8 for key, value in values.items()) + len(name) + 8
         _readable(f"metadata {name}", size, MAXIMUM_SMALL_BYTES)
         self._writer.add_metadata(name, dict(values))
 
     def attachment(self, a: Attachment) -> None:
-        """An attachment. Raises :class:`TooLarge` above what a reader takes."""
+        """Write an attachment. Raises :class:`TooLarge` above the limit of the reader."""
         _readable(f"attachment {a.name}", len(a.data) + 1024, MAXIMUM_BYTES)
         self._writer.add_attachment(a.log_time, a.log_time, a.name, a.media_type, a.data)
 
     def close_chunk(self) -> None:
-        """Writes the chunk in progress, if it has messages: until then it is in memory only."""
+        """Write the open chunk if it has messages; until then it is in memory only."""
         self._writer.flush()
 
     def finish(self) -> None:
-        """Writes the last chunk, the indexes, the statistics and the footer."""
+        """Write the last chunk, the indexes, the statistics and the footer."""
         self._writer.finish()
 
 

@@ -90,11 +90,11 @@ class Bus(Protocol):
 
     @property
     def joined(self) -> bool:
-        """Whether any link exists, to the router or to another process."""
+        """Whether a link to the router or to another process exists."""
 
     @property
     def dropped(self) -> int:
-        """How many messages and requests were dropped because too many were waiting."""
+        """The number of messages and requests that were dropped because too many were waiting."""
 
     async def close(self) -> None:
         """Withdraw every declaration and leave."""

@@ -4,7 +4,7 @@ Peer mode with explicit endpoints and gossip: processes meet at the router and t
 failure affects new processes only. There is no multicast, because it does not cross a bridge network.
 
 Callbacks run in Zenoh's own threads (``indirect=False``), copy the bytes and pass them to the loop. Measured
-(DESIGN.md): 122 us per request that way, 365 us with the default callback.
+(docs/design.md): 122 us per request that way, 365 us with the default callback.
 """
 
 from __future__ import annotations

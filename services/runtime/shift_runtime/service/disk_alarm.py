@@ -11,7 +11,7 @@ from shift_schemas.errors import Unavailable
 log = structlog.get_logger()
 
 CHECK_EVERY_S = 1.0
-"""How often a disk that refused a write is tried again. The alarm must fall within 1 s (RELIABILITY.md, row 11)."""
+"""How often a disk that refused a write is tried again. The alarm must fall within 1 s (docs/reliability.md)."""
 
 
 class DiskAlarm:
