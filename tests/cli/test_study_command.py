@@ -22,13 +22,13 @@ def run(*words: object, exit_code: int = 0) -> Result:
 
 
 def document(*words: object, exit_code: int = 0) -> Any:
-    """The one JSON document on standard output."""
+    """Return the one JSON document on standard output."""
     return json.loads(run(*words, "--json", exit_code=exit_code).stdout)
 
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
-    """A data folder with a study that is fine, one that is doubtful, and one with two mistakes."""
+    """Return a data folder with a valid study, a study with warnings, and one with two mistakes."""
     folder = tmp_path / "studies"
     folder.mkdir()
     (folder / "own.yaml").write_text("study: own\ntitle: My own\ntasks: [on, off]\n")

@@ -193,7 +193,7 @@ def test_the_router_s_own_variable(capfd: pytest.CaptureFixture[str]) -> None:
 
 @pytest.fixture
 def stranger() -> Iterator[ThreadingHTTPServer]:
-    """A web server that is not a gateway: it answers as ``server.answer`` says, or never where that is None."""
+    """Run a web server that is not a gateway; it answers with ``server.answer``, or never if that is None."""
 
     class Handler(BaseHTTPRequestHandler):
         def do_POST(self) -> None:

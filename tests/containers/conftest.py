@@ -10,7 +10,7 @@ from support.container_stack import Stack, why_no_engine
 
 @pytest.fixture(scope="session")
 def stack() -> Iterator[Stack]:
-    """The whole mesh, built, up and healthy, under a project name and a port of its own."""
+    """Build and start the whole mesh under its own project name and port."""
     reason = why_no_engine()
     if reason:
         pytest.skip(reason)

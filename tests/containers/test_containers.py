@@ -29,7 +29,7 @@ class Tour:
         self.n = 0
 
     def ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> dict[str, Any]:
-        """The answer; asks again while a service is away, as a robot's program would."""
+        """Return the answer; repeat the request while a service is away, as a robot's program would."""
         deadline = time.monotonic() + PATIENCE_S
         while True:
             try:
@@ -49,7 +49,7 @@ class Tour:
         assert self.ask("POST", "/v1/sessions", body)["state"] == "live"
 
     def interaction(self) -> None:
-        """Gaze, a decision, its result, and the model that has seen both."""
+        """Send gaze, a decision and its result, and wait for the model that has seen both."""
         self.n += 1
         times = [self.n + 0.1 * i for i in range(10)]
         gaze = {"source": "camera", "seq": self.n - 1, "t": times, "aoi": ["robot"] * 10}

@@ -30,7 +30,7 @@ def command(mesh: LiveMesh, file: Path, session: str, *flags: str) -> subprocess
 
 
 def played(mesh: LiveMesh, file: Path, speeds: tuple[float, ...]) -> list[dict[str, object]]:
-    """The partner model's gaze after the file at each of the speeds, all at the same time in sessions of their own."""
+    """Return the partner model's gaze after the file at each speed; the sessions run at the same time."""
     name = file.name.split(".")[0]
     with RestClient(mesh.url) as shift:
         running = []
@@ -90,7 +90,7 @@ def test_what_cannot_be_played_is_said_in_a_sentence(mesh: LiveMesh, tmp_path: P
 
 
 def table(path: Path, x: float, n: int = 300) -> Path:
-    """A Titta table of one second at 300 Hz, both eyes at ``x``, 0.5; -1 stands for lost."""
+    """Write a Titta table of one second at 300 Hz with both eyes at ``x``, 0.5; -1 means lost."""
     point = "gaze_point_on_display_area"
     header = ["device_time_stamp"]
     for eye in ("left", "right"):

@@ -28,7 +28,7 @@ RANDOM = random.Random(7)
 
 
 def payloads() -> dict[str, bytes]:
-    """What is no message of ours under any key."""
+    """Return payloads that are not a valid message under any key."""
     start = {"participant": "P", "study": "default", "seed": 1, "state": "live", "started": STAMP}
     marker = {"session": SESSION, "stamp": STAMP, "marker_id": "m", "text": "note", "surprise": 1}
     elsewhere = {"session": ANOTHER, "stamp": STAMP, **start}
@@ -59,7 +59,7 @@ def payloads() -> dict[str, bytes]:
 
 
 def keys() -> dict[str, tuple[str, ...]]:
-    """Every kind of key, and what else fits between its slashes."""
+    """Return every kind of key, with valid and invalid parts."""
     return {
         "facts": tuple(f"shift/v1/{SESSION}/{subject}" for subject in SUBJECTS),
         "gaze": (f"shift/v1/{SESSION}/in/gaze",),
@@ -116,7 +116,7 @@ class Stranger(threading.Thread):
             return
 
     def get(self, name: str, key: str, payload: bytes) -> None:
-        """Asks without waiting, as an attacker would; keeps who answered as though it were a good question."""
+        """Send a request without waiting, as an attacker would, and keep who answered it as if it were valid."""
 
         def heard(reply: zenoh.Reply) -> None:
             if reply.ok is not None and "/rpc/" in key:
@@ -126,7 +126,7 @@ class Stranger(threading.Thread):
 
 
 def dropped(mesh: LiveMesh) -> dict[str, float]:
-    """Per service, what ``shift_messages_dropped_total`` counts as malformed."""
+    """Return for each service the malformed messages in ``shift_messages_dropped_total``."""
     text = httpx.get(f"{mesh.url}/metrics", timeout=10.0).text
     return {
         sample.labels["service"]: sample.value

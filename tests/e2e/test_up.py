@@ -28,7 +28,7 @@ def pids(mesh: LiveMesh) -> dict[str, int]:
 
 
 def gone(pid: int) -> bool:
-    """Whether there is no such process any more, or only what its new parent has not reaped."""
+    """Return whether the process has ended; its new parent may not have reaped it yet."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
     except OSError:
@@ -124,7 +124,7 @@ def test_demo_makes_a_session_with_a_person_in_it(tmp_path: Path) -> None:
 
 
 def refused(folder: Path, *flags: str, **environment: str) -> str:
-    """``up`` with these ends at once with exit code 2; what it said, one sentence or a few."""
+    """Check that ``up`` ends at once with exit code 2, and return its message."""
     given = [] if "--port" in flags else ["--port", str(free_port())]
     given += [] if "--zenoh" in flags else ["--zenoh", f"tcp/127.0.0.1:{free_port()}"]
     given += [] if "--data" in flags else ["--data", str(folder / "another")]

@@ -25,7 +25,7 @@ ROOM_LEFT_KB = (0, 100, 200, 400)
 
 
 def gaze(shift: RestClient, session: str, chunks: int, samples: int) -> int:
-    """Gaze that hardly compresses; how many samples were acknowledged."""
+    """Send gaze that hardly compresses, and return the number of acknowledged samples."""
     accepted = 0
     for seq in range(chunks):
         t = [seq * samples / 300 + i / 300 for i in range(samples)]
@@ -35,7 +35,7 @@ def gaze(shift: RestClient, session: str, chunks: int, samples: int) -> int:
 
 
 def check(mesh: LiveMesh, session: str, samples: int, decisions: int) -> None:
-    """All that was acknowledged is there, and the recording is what its inputs give."""
+    """Check that everything acknowledged is recorded, and that the recording verifies."""
     path = mesh.data / "recordings" / f"{session}.mcap"
     report = verify(path)
     assert (report.ok, report.complete) == (True, True), report.difference

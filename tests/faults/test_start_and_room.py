@@ -117,7 +117,7 @@ def test_row_11_a_disk_that_fills_up_refuses_and_goes_on_exactly_once_there_is_r
 
 
 def _refusal(mesh: LiveMesh) -> httpx.Response:
-    """A marker is noted for as long as the journal has room left in its file; then it is refused."""
+    """Send markers until one is refused: the journal accepts them while its file has room."""
     for n in range(2000):
         body = {"text": "x" * 2000, "marker_id": f"m{n}"}
         answer = httpx.post(f"{mesh.url}/v1/sessions/full/markers", json=body, timeout=30.0)
@@ -142,7 +142,7 @@ def test_row_12_no_session_starts_where_its_recording_cannot_be_written(tmp_path
 
 
 def _start(mesh: LiveMesh) -> str:
-    """A start that is refused with a sentence."""
+    """Start a session, and return the sentence of the refusal."""
     answer = httpx.post(f"{mesh.url}/v1/sessions", json={"participant": "P1", "session": "s1"}, timeout=30.0)
     assert answer.status_code == 503
     assert answer.headers["content-type"] == "application/problem+json"

@@ -11,7 +11,7 @@ from support.recordings import finished, interleaved, write_segment
 
 @pytest.fixture(scope="session")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished recording of 120 messages in many chunks."""
+    """Return a finished recording of 120 messages in many chunks."""
     folder = tmp_path_factory.mktemp("whole")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(finishing, "CHUNK_BYTES", 6000)
@@ -20,5 +20,5 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def segment(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An unfinished segment of 120 messages in six chunks."""
+    """Return an unfinished segment of 120 messages in six chunks."""
     return write_segment(tmp_path_factory.mktemp("segment"), interleaved(40))

@@ -13,7 +13,7 @@ from shift_schemas.errors import DamagedRecording, UnknownThing
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    """Something to take a checksum of."""
+    """Return a file with a checksum."""
     path = tmp_path / "s1.mcap"
     path.write_bytes(b"gaze" * 1000)
     return path

@@ -12,13 +12,13 @@ from shift_schemas.timestamps import Stamp
 
 
 def entry(excluded: bool, reason: str, at: int = 1) -> ExclusionEntry:
-    """A change by Ada."""
+    """Return a change by Ada."""
     return ExclusionEntry(excluded=excluded, reason=reason, author="Ada", time=Stamp(sec=at, nsec=0))
 
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    """A file that stands for a recording."""
+    """Return a file in the place of a recording."""
     path = tmp_path / "s1.mcap"
     path.write_bytes(b"whole")
     return path

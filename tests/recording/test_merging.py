@@ -28,7 +28,7 @@ from support.recordings import (
 
 
 def messages(path: Path) -> list[tuple[object, ...]]:
-    """All of a recording, which must be whole."""
+    """Return all messages of a recording, which must be complete."""
     recording = Recording(path)
     found = [tuple(m) for m in recording.messages()]
     assert recording.report.complete
@@ -36,7 +36,7 @@ def messages(path: Path) -> list[tuple[object, ...]]:
 
 
 def last_chunk(path: Path) -> int:
-    """Where a recording's last chunk begins."""
+    """Return the position of a recording's last chunk."""
     return max(located.chunk for located in Recording(path).located())
 
 

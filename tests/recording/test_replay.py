@@ -31,7 +31,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 async def _heard(replay: Replay, pacer: Pacer | None = None) -> list[tuple[float, Incoming]]:
-    """What a subscriber hears of a replay, and when, s after its start."""
+    """Return what a subscriber receives of a replay, and when, s after its start."""
     hub = Hub()
     bus, listener = MemoryBus(hub), MemoryBus(hub)
     heard: list[tuple[float, Incoming]] = []

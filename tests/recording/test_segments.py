@@ -99,7 +99,7 @@ def test_the_largest_message_that_is_taken_can_be_read(tmp_path: Path) -> None:
 
 
 def run(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Runs Python code in a process of its own, with the tests' own modules."""
+    """Run Python code in its own process, with the tests' modules."""
     path = os.pathsep.join([str(HERE), *sys.path])
     return subprocess.run(
         [sys.executable, "-c", code, *arguments],

@@ -24,7 +24,7 @@ SERVICES = ("router", "recorder", "monitor", "decider", "learner", "gateway", "s
 
 
 def run(*command: str, env: dict[str, str] | None = None, check: bool = True) -> str:
-    """Standard output of a command at the repository's root; a failure carries both outputs."""
+    """Return the standard output of a command at the repository's root; an error shows both outputs."""
     done = subprocess.run(
         command, cwd=ROOT, env={**os.environ, **(env or {})}, capture_output=True, text=True, check=False
     )
@@ -40,7 +40,7 @@ def succeeds(*command: str) -> bool:
 
 
 def compose_command() -> tuple[str, ...] | None:
-    """Compose v2 where it is there, else the older docker-compose."""
+    """Return Compose v2 if it is installed, else the older docker-compose."""
     return next(
         (c for c in (("docker", "compose"), ("docker-compose",)) if succeeds(*c, "version")),
         None,
@@ -48,7 +48,7 @@ def compose_command() -> tuple[str, ...] | None:
 
 
 def why_no_engine() -> str | None:
-    """Why the tests cannot run here, or None. With CI=true that is a failure: there they must run."""
+    """Return why the tests cannot run here, or None. With CI=true they must run, so that a reason is a failure."""
     if not succeeds("docker", "version"):
         reason = "no container engine answers `docker version`, so nothing is tried in containers"
     elif compose_command() is None:
@@ -80,7 +80,7 @@ class Stack:
 
     @classmethod
     def built(cls) -> Stack:
-        """The image as `make image` builds it."""
+        """Build the image as `make image` does, and return its name."""
         given = os.environ.get("SHIFT_TEST_IMAGE")
         if given:
             return cls(image=given, base="", own_image=False, build_s=0.0)
@@ -99,7 +99,7 @@ class Stack:
         return run(*(compose_command() or ()), "-p", self.project, *arguments, env=env, check=check)
 
     def up(self, patience_s: float = 120.0) -> float:
-        """Up and healthy; returns the seconds that it took."""
+        """Start the stack, wait until it is healthy, and return the seconds that it took."""
         start = time.monotonic()
         self.compose("up", "-d")
         self.wait_healthy(patience_s)
@@ -127,7 +127,7 @@ class Stack:
         return str(self.inspect(service)["State"].get("Health", {}).get("Status", "without a check"))
 
     def container(self, service: str) -> str:
-        """The service's container's id."""
+        """Return the id of the service's container."""
         labels = (f"project={self.project}", f"service={service}")
         filters = [word for label in labels for word in ("--filter", f"label=com.docker.compose.{label}")]
         ids = run("docker", "ps", "--all", "--quiet", *filters).split()
@@ -138,11 +138,11 @@ class Stack:
         return dict(json.loads(run("docker", "inspect", self.container(service)))[0])
 
     def python(self, service: str, code: str, *options: str) -> str:
-        """What a line of Python prints inside a service's container."""
+        """Return what a line of Python prints inside a service's container."""
         return run("docker", "exec", *options, self.container(service), "python", "-c", code)
 
     def kill_process(self, service: str) -> None:
-        """kill -9 from outside: `docker kill` would count as stopped by hand, and nothing would restart it."""
+        """Kill a process from outside: `docker kill` counts as a stop by hand, after which nothing restarts it."""
         pid = self.inspect(service)["State"]["Pid"]
         code = f"import os; os.kill({pid}, 9)"
         namespaces = ("--pid", "host", "--user", "0", "--network", "none")

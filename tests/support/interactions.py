@@ -40,7 +40,7 @@ def interact(
     after: Callable[[int], None] = lambda n: None,
     study: dict[str, Any] = STUDY,
 ) -> Played:
-    """A session of ``episodes`` interactions over REST; ``after(n)`` is called after each."""
+    """Run a session of ``episodes`` interactions over REST; ``after(n)`` is called after each."""
     with RestClient(mesh.url, patience_s=60.0) as shift:
         shift.start("P00", session=session, study=study, seed=seed)
         done = []
@@ -56,7 +56,7 @@ def played(done: Iterable[LiveEpisode], ended: dict[str, Any]) -> Played:
 
 
 def expected(seed: int, episodes: int = 100, study: dict[str, Any] = STUDY) -> list[dict[str, Any]]:
-    """The decisions of the same session through the bare cores, with their rewards."""
+    """Return the decisions and rewards of the same session from the cores alone."""
     return [
         essence(e.decision.model_dump(mode="json")) | {"reward": e.performance.reward}
         for e in play(paper_user(USER), study_of(study), seed, episodes)
@@ -64,7 +64,7 @@ def expected(seed: int, episodes: int = 100, study: dict[str, Any] = STUDY) -> l
 
 
 def essence(decision: dict[str, Any]) -> dict[str, Any]:
-    """What of a decision two runs with the same seed have in common: all but ids, stamps and versions."""
+    """Return what two runs with the same seed have in common: all but ids, stamps and versions."""
     kept = (
         "n", "task", "strategy", "observation", "scores", "cognitive_state", "suggested", "actions",
         "probabilities", "propensity", "explored", "policy_source", "stale", "state", "seed",
@@ -77,7 +77,7 @@ def essences(done: Played) -> list[dict[str, Any]]:
 
 
 def check_recording(mesh: LiveMesh, done: Played) -> dict[str, list[dict[str, Any]]]:
-    """The recording of a session that ended is whole, in the standard reader; its messages by topic."""
+    """Check with the standard reader that a recording is complete, and return its messages by topic."""
     path = mesh.data / "recordings" / done.ended["recording"]
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     assert digest == done.ended["sha256"]
@@ -94,7 +94,7 @@ def check_recording(mesh: LiveMesh, done: Played) -> dict[str, list[dict[str, An
 
 
 def read_recording(path: Path) -> dict[str, list[dict[str, Any]]]:
-    """A recording's messages by topic, through the standard reader; each owner's sequences are 1, 2, 3 ..."""
+    """Return the messages by topic from the standard reader; check that each owner's sequences are 1, 2, 3 ..."""
     messages: dict[str, list[dict[str, Any]]] = {}
     sequences: dict[str, list[int]] = {}
     with open(path, "rb") as stream:

@@ -37,7 +37,7 @@ class Recorded(NamedTuple):
 
 
 def gaze_fact(n: int, samples: int = 10) -> Gaze:
-    """The ``n``-th chunk of gaze at 300 Hz."""
+    """Return the ``n``-th chunk of gaze at 300 Hz."""
     t = [(n * samples + i) / 300 for i in range(samples)]
     x = [((n * 7919 + i * 104729) % 1000) / 1000 for i in range(samples)]
     valid = [True] * samples
@@ -45,7 +45,7 @@ def gaze_fact(n: int, samples: int = 10) -> Gaze:
 
 
 def decision_fact(n: int, propensity: float | None = None) -> Decision:
-    """The ``n``-th decision; without a propensity it follows an override."""
+    """Return the ``n``-th decision; without a propensity it follows an override."""
     strategy = {"negation": "affirmation", "hesitation": "none"}
     return Decision(
         session="s1", stamp=Stamp.of(START + n), decision_id=f"d{n}", task="grasp", n=n, strategy=strategy,
@@ -57,12 +57,12 @@ def decision_fact(n: int, propensity: float | None = None) -> Decision:
 
 
 def marker_fact(n: int) -> Marker:
-    """The ``n``-th marker."""
+    """Return the ``n``-th marker."""
     return Marker(session="s1", stamp=Stamp.of(START + n), marker_id=f"m{n}", text=f"note {n}")
 
 
 def interleaved(rounds: int, start: int = 1) -> list[Recorded]:
-    """Rounds of a chunk of gaze, a decision and a marker; each owner counts from ``start``."""
+    """Return rounds of a chunk of gaze, a decision and a marker; each owner counts from ``start``."""
     facts: list[tuple[int, Fact]] = []
     for n in range(start, start + rounds):
         facts += [(n, gaze_fact(n)), (n, decision_fact(n, 0.5 if n % 2 else None)), (n, marker_fact(n))]
@@ -75,7 +75,7 @@ def interleaved(rounds: int, start: int = 1) -> list[Recorded]:
 def write_segment(
     folder: Path, messages: Iterable[Recorded], *, flush_every: int = 20, finish: bool = False, session: str = "s1"
 ) -> Path:
-    """A segment that holds ``messages``, all of them flushed; left as a crash leaves it unless ``finish``."""
+    """Write and flush ``messages`` to a segment; without ``finish`` it stays as a crash leaves it."""
     segment = SegmentWriter(folder, session, SCHEMAS)
     for i, message in enumerate(messages, start=1):
         segment.write(*message)
@@ -87,12 +87,12 @@ def write_segment(
 
 
 def finished(folder: Path, sources: list[Path], name: str = "s1.mcap") -> FinishedRecording:
-    """``sources`` as one recording."""
+    """Merge ``sources`` into one recording."""
     return finish_recording("s1", sources, folder / name, schemas=SCHEMAS, metadata=METADATA, attachments=ATTACHMENTS)
 
 
 def owner_sequences(messages: Iterable[tuple[str, int]]) -> dict[str, list[int]]:
-    """Topic and sequence pairs, by owner, in their order."""
+    """Return topic and sequence pairs by owner, in their order."""
     found: dict[str, list[int]] = {}
     for topic, sequence in messages:
         found.setdefault(OWNER_OF[topic], []).append(sequence)
@@ -100,12 +100,12 @@ def owner_sequences(messages: Iterable[tuple[str, int]]) -> dict[str, list[int]]
 
 
 def record(opcode: int, body: bytes) -> bytes:
-    """An MCAP record."""
+    """Return an MCAP record."""
     return struct.pack("<BQ", opcode, len(body)) + body
 
 
 def chunk(compression: str, packed: bytes, claimed: int, crc: int = 0) -> bytes:
-    """A chunk record that claims to unpack to ``claimed`` bytes."""
+    """Return a chunk record that claims to unpack to ``claimed`` bytes."""
     name = compression.encode()
     head = struct.pack("<QQQII", 0, 0, claimed, crc, len(name)) + name
     return record(6, head + struct.pack("<Q", len(packed)) + packed)
@@ -116,5 +116,5 @@ HEADER = record(1, struct.pack("<II", 0, 0))
 
 
 def honest_chunk(content: bytes, compression: str = "", packed: bytes | None = None) -> bytes:
-    """A chunk record with the right size and checksum."""
+    """Return a chunk record with the right size and checksum."""
     return chunk(compression, content if packed is None else packed, len(content), zlib.crc32(content))

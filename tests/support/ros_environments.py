@@ -29,7 +29,7 @@ PACKAGES = ("schemas", *(f"services/{room}" for room in ("model", "study", "runt
 
 
 def python_of(name: str) -> str:
-    """The interpreter of the environment ``name``, which is made if it is not there."""
+    """Return the interpreter of the environment ``name``, which is made if it does not exist."""
     CACHE.mkdir(parents=True, exist_ok=True)
     folder = CACHE / name
     stamp = folder / ".made"
@@ -46,7 +46,7 @@ def python_of(name: str) -> str:
 
 
 def work_folder() -> Path:
-    """Where peers run: pyzeros compiles its codecs into its working folder, once."""
+    """Return the working folder of peers: pyzeros compiles its codecs into it once."""
     folder = CACHE / "work"
     folder.mkdir(parents=True, exist_ok=True)
     return folder

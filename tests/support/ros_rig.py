@@ -114,7 +114,7 @@ class Peer:
         assert self._line() == "ready"
 
     def ask(self, method: str, *arguments: object) -> Any:
-        """What the peer's method gives."""
+        """Return the result of the peer's method."""
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps([method, *arguments]) + "\n")
         self.process.stdin.flush()
@@ -126,7 +126,7 @@ class Peer:
         self.ask("publish", topic, message if isinstance(message, str) else json.dumps(message))
 
     def decide(self, wait_s: float = 10.0) -> dict[str, Any] | None:
-        """The next strategy; none where no answer came."""
+        """Return the next strategy, or None without an answer."""
         answer = self.ask("call", "/shift/next_strategy", wait_s)
         if answer is None:
             return None
@@ -154,7 +154,7 @@ class Peer:
 
 @contextmanager
 def peer(name: str, bridge: Bridge) -> Iterator[Peer]:
-    """A peer until left."""
+    """Run a peer until the context is left."""
     found = Peer(name, bridge)
     try:
         yield found
@@ -164,6 +164,6 @@ def peer(name: str, bridge: Bridge) -> Iterator[Peer]:
 
 @contextmanager
 def rpc_peer(bridge: Bridge, folder: Path) -> Iterator[Peer]:
-    """The peer that the benchmark calls from."""
+    """Run the peer from which the benchmark calls."""
     with peer("pyzeros" if bridge.backend == "native" else "rclpy", bridge) as found:
         yield found

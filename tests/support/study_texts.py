@@ -76,7 +76,7 @@ OUT_OF_RANGE = [
 
 
 def written(path: str, value: object) -> tuple[str, int]:
-    """A study file in block style with ``value`` at ``path``, and the line on which it stands."""
+    """Return a study file in block style with ``value`` at ``path``, and the line of the value."""
     names = path.split(".")
     head = [] if path == "study" else ["study: x"]
     lines = [*head, *(f"{'  ' * i}{n}:" for i, n in enumerate(names[:-1]))]

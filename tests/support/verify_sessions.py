@@ -103,7 +103,7 @@ class Session:
                 self.do(reader, fact)
 
     def _begun(self, reader: str) -> bool:
-        """Whether a service knows the session, and its configuration where it cannot do without."""
+        """Return whether a service knows the session and what it needs of the configuration."""
         state = self.states[reader]
         return state is not None and bool(reader == "decider" or state.config)
 
@@ -118,7 +118,7 @@ class Session:
             self.recorded.append((fact.subject, sequence, fact))
 
     def gaze(self, source: str = "tx300") -> None:
-        """A chunk of ten points around a random place, some of them lost."""
+        """Publish a chunk of ten points around a random place, some of them lost."""
         x = self.rng.random()
         t, xs, valid = [], [], []
         for _ in range(10):
@@ -132,7 +132,7 @@ class Session:
         self.chunks += 1 if self.rng.random() > 0.05 else 3  # some are lost on the way
 
     def decide(self, n: int, timed_out: bool) -> None:
-        """Ask for decision ``n``; ``timed_out``: do not wait for what it needs."""
+        """Ask for decision ``n``; with ``timed_out``, do not wait for its inputs."""
         command = Decide(command_id=f"d{n}", session="s1", task=self.rng.choice("ab"), need=self.answered)
         while True:
             try:
@@ -145,7 +145,7 @@ class Session:
         self.answered = self.answered.model_copy(update={"decision": n})
 
     def report(self, n: int) -> None:
-        """Tell how decision ``n`` went."""
+        """Report how decision ``n`` went."""
         results = [Result(success=self.rng.random() > 0.4, duration_s=self.rng.uniform(0, 9)) for _ in range(2)]
         command = ReportPerformance(
             command_id=f"d{n}", session="s1", need=self.answered, comprehension=results[0], enabledness=results[1]
@@ -172,7 +172,7 @@ class Session:
         self.do("decider", command, timed_out=True)
 
     def interactions(self, count: int) -> Session:
-        """So many, with all that can happen."""
+        """Run so many interactions with every kind of event."""
         self.deliver()
         for n in range(1, count + 1):
             for _ in range(self.rng.randrange(5)):
@@ -204,7 +204,7 @@ class Session:
     # --- files ---
 
     def segment(self, folder: Path) -> Path:
-        """A segment of what was recorded, as a crash leaves it."""
+        """Write the recorded facts to a segment, as a crash leaves it."""
         segment = SegmentWriter(folder / "segments", "s1", SCHEMAS)
         for i, (subject, sequence, fact) in enumerate(self.recorded):
             log_time = START + 10**9 + i * 1_000_000
@@ -214,7 +214,7 @@ class Session:
         return segment.path
 
     def finished(self, folder: Path) -> Path:
-        """The recording, with its front and its checksum."""
+        """Write the recording with its metadata and its checksum."""
         done = finish_recording(
             "s1", [self.segment(folder)], folder / "s1.mcap",
             schemas=SCHEMAS, metadata=self.metadata(), attachments=self.attachments(),
@@ -222,12 +222,12 @@ class Session:
         return done.path
 
     def metadata(self) -> dict[str, dict[str, str]]:
-        """As the recorder's shell writes it."""
+        """Return the metadata as the recorder's shell writes it."""
         state: recorder.RecorderState = self.states["recorder"]
         return metadata_of(state.fact, state.config)
 
     def attachments(self) -> list[Attachment]:
-        """As the recorder's shell writes them."""
+        """Return the attachments as the recorder's shell writes them."""
         state: recorder.RecorderState = self.states["recorder"]
         policies = [recorded_json(fact) for subject, _, fact in self.recorded if subject == "policy"]
         ends = (policies[0], policies[-1]) if policies else None
@@ -239,7 +239,7 @@ Edit = Callable[[list[RecordedMessage]], Iterable[RecordedMessage]]
 
 
 def rewritten(recording: Path, folder: Path, edit: Edit, checksum: bool = True) -> Path:
-    """The recording with its messages edited: everything else valid, checksums and all."""
+    """Write the recording with edited messages; everything else is valid, including all checksums."""
     source = Recording(recording)
     messages = list(source.messages())
     folder.mkdir(exist_ok=True)
@@ -260,7 +260,7 @@ def rewritten(recording: Path, folder: Path, edit: Edit, checksum: bool = True) 
 
 
 def changed(subject: str, number: int, path: Sequence[str | int], change: Callable[[Any], Any]) -> Edit:
-    """An edit of one field of the ``number``-th message (from 0) of a subject."""
+    """Return an edit of one field of the ``number``-th message (from 0) of a subject."""
 
     def edit(messages: list[RecordedMessage]) -> list[RecordedMessage]:
         place = [i for i, m in enumerate(messages) if m.topic == subject][number]
@@ -277,7 +277,7 @@ def changed(subject: str, number: int, path: Sequence[str | int], change: Callab
 
 
 def without(subject: str, number: int) -> Edit:
-    """An edit that drops one message."""
+    """Return an edit that drops one message."""
 
     def edit(messages: list[RecordedMessage]) -> list[RecordedMessage]:
         place = [i for i, m in enumerate(messages) if m.topic == subject][number]

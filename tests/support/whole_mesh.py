@@ -20,7 +20,7 @@ READY_WITHIN_S = 60.0
 
 
 def free_port() -> int:
-    """A port that nobody listens on now."""
+    """Return a port on which nobody listens now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -38,11 +38,11 @@ class LiveMesh:
 
     @property
     def url(self) -> str:
-        """The gateway."""
+        """The address of the gateway."""
         return f"http://127.0.0.1:{self.port}"
 
     def pid_of(self, package: str) -> int:
-        """The process of a service, found by its package in its command line."""
+        """Return the process id of a service, found by its package in the command line."""
         found = self._pids(package)
         assert len(found) == 1, f"{package}: {found}"
         return found[0]
@@ -61,7 +61,7 @@ class LiveMesh:
         return package in line and parent == self.process.pid
 
     def kill(self, package: str) -> int:
-        """kill -9 of a service, once it is back from the kill before; the pid that it had."""
+        """Kill a service with kill -9 once it is back from the last kill; return its process id."""
         end = time.monotonic() + READY_WITHIN_S
         while not self._pids(package) and time.monotonic() < end:
             time.sleep(0.01)
@@ -83,7 +83,7 @@ class LiveMesh:
         raise AssertionError(self.log.read_text())
 
     def ready(self) -> dict[str, Any]:
-        """What ``/readyz`` says."""
+        """Return the answer of ``/readyz``."""
         found: dict[str, Any] = httpx.get(f"{self.url}/readyz", timeout=10.0).json()
         return found
 
@@ -110,7 +110,7 @@ def running_mesh(
     program: tuple[str, ...] = ("-m", "shift_cli.main"),
     environment: dict[str, str] | None = None,
 ) -> Iterator[LiveMesh]:
-    """``shift-mesh up`` until left; stopped, and its log shown where something went wrong."""
+    """Run ``shift-mesh up`` until the context is left; its log is shown after a failure."""
     port = port or free_port()
     zenoh = zenoh or f"tcp/127.0.0.1:{free_port()}"
     log = folder / "mesh.log"

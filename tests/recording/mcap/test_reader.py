@@ -31,7 +31,7 @@ from support.recordings import (
 
 
 def read(path: Path) -> tuple[list[RecordedMessage], Recording, DamagedRecording | None]:
-    """What can be read of a file, and the error if it is refused. Any other error fails the test."""
+    """Return what can be read of a file, and the error if it is refused. Any other error fails the test."""
     recording, found = Recording(path), []
     try:
         for message in recording.messages():
@@ -131,7 +131,7 @@ def test_of_400_flipped_bits_what_is_read_is_right_or_refused(
 
 
 def record_heads(data: bytes | bytearray) -> list[int]:
-    """Where the records of a file begin."""
+    """Return the positions of a file's records."""
     at, heads = len(MAGIC), []
     while at < len(data):
         heads.append(at)
@@ -229,7 +229,7 @@ with open("/proc/self/status") as status:  # the process' own; ru_maxrss begins 
 
 
 def zeros(packer: object, total: int = 1_500_000_000) -> bytes:
-    """A great many zeros, packed, without ever having them all."""
+    """Return a great many zeros, compressed piece by piece."""
     block = bytes(10_000_000)
     begin = getattr(packer, "begin", None)
     parts = [begin()] if begin else []
@@ -238,7 +238,7 @@ def zeros(packer: object, total: int = 1_500_000_000) -> bytes:
 
 
 def bombs() -> dict[str, bytes]:
-    """Recordings that claim or unpack to far more than they are."""
+    """Yield recordings that claim or unpack to far more than their size."""
     packed = zeros(zstandard.ZstdCompressor(level=3).compressobj(size=1_500_000_000))
     assert len(packed) < 150_000
     wide = zstandard.ZstdCompressionParameters.from_level(1, window_log=30)
@@ -267,7 +267,7 @@ def bombs() -> dict[str, bytes]:
 
 
 def dense_metadata(number: int) -> bytes:
-    """The record that takes most memory for its size: a great many short texts."""
+    """Return the record that needs most memory for its size: a great many short texts."""
     entries = b"".join(b"\3\0\0\0" + i.to_bytes(3, "little").translate(_ASCII) + bytes(4) for i in range(90_000))
     return record(12, b"\4\0\0\0" + f"{number:04}".encode() + len(entries).to_bytes(4, "little") + entries)
 

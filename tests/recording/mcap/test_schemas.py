@@ -20,7 +20,7 @@ NUMBERS = ("number", "integer")
 
 
 def foxglove_definitions(schema: dict[str, Any], name: str) -> dict[str, list[str]]:
-    """Field names by type, by the rules of Foxglove's parseJsonSchema: it throws where this asserts."""
+    """Return field names by type, by the rules of Foxglove's parseJsonSchema, which throws where this asserts."""
     assert schema["type"] == "object", name
     found: dict[str, list[str]] = {name: list(schema["properties"])}
     for key, field in schema["properties"].items():
@@ -36,14 +36,14 @@ def foxglove_definitions(schema: dict[str, Any], name: str) -> dict[str, list[st
 
 
 def nodes(node: Any) -> Any:
-    """Every object and list within a schema."""
+    """Yield every object and list within a schema."""
     yield node
     for child in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
         yield from nodes(child)
 
 
 def matches(value: Any, schema: dict[str, Any], at: str = "") -> None:
-    """A naive validator for the few keywords that the schemas have."""
+    """Return whether a value is valid; this handles only the few keywords that the schemas have."""
     kinds: dict[str, Any] = {
         "object": dict,
         "array": list,
@@ -119,7 +119,7 @@ def test_known_names_stand_where_maps_are() -> None:
 
 
 def walk(node: dict[str, Any], at: str, maps: set[str]) -> None:
-    """Collects where maps are."""
+    """Collect the paths of maps."""
     if "additionalProperties" in node:
         maps.add(at)
     elif node["type"] == "array":

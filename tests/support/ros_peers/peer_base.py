@@ -35,7 +35,7 @@ class PeerBase:
         return self.said[topic][since:]
 
     def wait_heard(self, topic, count, wait_s):
-        """What was heard, once there is so much."""
+        """Wait for so many messages, and return them."""
         until = time.monotonic() + wait_s
         while len(self.said[topic]) < count and time.monotonic() < until:
             time.sleep(0.002)
@@ -45,7 +45,7 @@ class PeerBase:
         self.clients[name] = self._client(name)
 
     def call(self, name, wait_s=10.0):
-        """[success, message], or null where no answer came."""
+        """Return [success, message], or null without an answer."""
         return self._call(self.clients[name], wait_s)
 
     def timed_call(self, name):
