@@ -56,7 +56,13 @@ SCHEMAS = subject_schemas()
 class Session:
     """One session of study ``study`` in ``recording_format``; ``seed`` gives its random order."""
 
-    def __init__(self, study: dict[str, Any] | None = None, seed: int = 1, recording_format: int = FORMAT) -> None:
+    def __init__(
+        self,
+        study: dict[str, Any] | None = None,
+        seed: int = 1,
+        recording_format: int = FORMAT,
+        steady: bool = False,
+    ) -> None:
         self.rng = random.Random(seed)
         self.now_ns = START
         self.states: dict[str, Any] = dict.fromkeys(CORES)
@@ -66,6 +72,7 @@ class Session:
         self.unrecorded = {owner: deque[tuple[int, Fact]]() for owner in CORES}
         self.answered = Seen(config=1)
         self.gaze_s = 0.0
+        self.steady = steady
         self.chunks = 0
         given = {"study": "test", "tasks": ["a", "b"], **(study or {})}
         start = StartSession(
@@ -118,8 +125,8 @@ class Session:
             self.recorded.append((fact.subject, sequence, fact))
 
     def gaze(self, source: str = "tx300") -> None:
-        """Publish a chunk of ten points around a random place, some of them lost."""
-        x = self.rng.random()
+        """Publish a chunk of ten points around a random place, some of them lost; steady gaze stays in one place."""
+        x = 0.5 if self.steady else self.rng.random()
         t, xs, valid = [], [], []
         for _ in range(10):
             self.gaze_s += 1 / 60

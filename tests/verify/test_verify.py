@@ -52,6 +52,16 @@ def test_a_hundred_interactions_are_derived_again(
     assert report.checked["decision"] == report.checked["performance"] == report.checked["transition"] == 100
 
 
+def test_short_sessions_end_with_every_kind_of_last_message(tmp_path: Path) -> None:
+    for seed in range(60):
+        session = Session(seed=seed, steady=True).interactions(1 + seed % 3)
+        for _ in range(seed % 5):
+            session.gaze("spare")
+        recording = session.ended().finished(tmp_path / str(seed))
+        report = verify(recording)
+        assert (report.ok, report.complete) == (True, True), (seed, report.difference)
+
+
 def test_late_and_stale_decisions_and_every_source_are_among_them(recording: Path) -> None:
     decisions = [json.loads(m.data) for m in Recording(recording).messages({"decision"})]
     assert {"learner", "last_policy", "override"} <= {d["policy_source"] for d in decisions}

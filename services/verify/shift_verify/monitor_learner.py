@@ -56,9 +56,11 @@ class MonitorFold(OutputFold):
     def take(self, placed: FactAtPlace) -> None:
         """Derive up to the owner's next fact. Raises :class:`Differs`, ``NotRecorded``."""
         self._last, self._before_show = placed, None
-        if not self.group and isinstance(placed.fact, Gaze):
-            self._gaze = self._gaze_input(placed.fact)
-            self._length = self._length_without_observation(placed.fact, self._gaze)
+        if not self.group:
+            self._length = 0
+            if isinstance(placed.fact, Gaze):
+                self._gaze = self._gaze_input(placed.fact)
+                self._length = self._length_without_observation(placed.fact, self._gaze)
         super().take(placed)
 
     def ends_group(self, placed: FactAtPlace) -> bool:
