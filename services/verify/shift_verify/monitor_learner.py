@@ -40,6 +40,8 @@ class MonitorFold(OutputFold):
 
     closing = Observation
     state: monitor.MonitorState
+    _stepped: Step[Any] | None = None
+    """The step of the open group's chunk, from which its length was taken; :meth:`step` returns it once."""
 
     def __init__(self, inputs: Inputs) -> None:
         super().__init__(inputs)
@@ -57,7 +59,7 @@ class MonitorFold(OutputFold):
         """Derive up to the owner's next fact. Raises :class:`Differs`, ``NotRecorded``."""
         self._last, self._before_show = placed, None
         if not self.group:
-            self._length = 0
+            self._length, self._stepped = 0, None
             if isinstance(placed.fact, Gaze):
                 self._gaze = self._gaze_input(placed.fact)
                 self._length = self._length_without_observation(placed.fact, self._gaze)
@@ -71,13 +73,17 @@ class MonitorFold(OutputFold):
         if self.inputs.session.format < 4:
             return 0
         try:
-            facts = self.step(self.state, gaze, fact.stamp).facts
+            self._stepped = self.step(self.state, gaze, fact.stamp)
         except (ShiftError, ValueError, LookupError):
             return 0  # the difference is found when the group is derived
+        facts = self._stepped.facts
         return 0 if isinstance(facts[-1], Observation) else len(facts)
 
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """Return the step of the core, without waiting."""
+        stepped, self._stepped = self._stepped, None
+        if stepped is not None and event is self._gaze:
+            return stepped
         return monitor.step(state, event, now, timed_out=True)
 
     def input_of(self, group: list[FactAtPlace]) -> object | None:
