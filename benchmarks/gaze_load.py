@@ -29,6 +29,7 @@ import zenoh
 from rich.console import Console
 from rich.table import Table
 from shift_runtime.bus.zenoh_config import zenoh_config
+from shift_schemas.shards import Shard, shard_of
 from shift_sources.files.formats import read_samples
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -59,16 +60,25 @@ def chunks(person: int, count: int) -> Iterator[bytes]:
         }).encode()  # fmt: skip
 
 
-def send(over: str, where: str, sessions: list[str], seconds: float) -> None:
+def send(over: str, where: str, sessions: list[str], seconds: float, workers: int) -> None:
     """Send gaze to every session at its rate."""
     count = round(seconds * RATE_HZ / CHUNK)
     prepared = [list(chunks(i, count)) for i in range(min(len(sessions), len(RECORDINGS)))]
-    asyncio.run((_over_zenoh if over == "zenoh" else _over_websockets)(where, sessions, prepared, count))
+    if over == "zenoh":
+        asyncio.run(_over_zenoh(where, sessions, prepared, count, workers))
+    else:
+        asyncio.run(_over_websockets(where, sessions, prepared, count))
 
 
-async def _over_zenoh(where: str, sessions: list[str], prepared: list[list[bytes]], count: int) -> None:
+def key_of(session: str, workers: int) -> str:
+    """Return the key of a session's gaze, as a client without a namespace of its own sees it."""
+    name = Shard(shard_of(session, workers), workers).name
+    return f"{name}/shift/v1/{session}/in/gaze".removeprefix("/")
+
+
+async def _over_zenoh(where: str, sessions: list[str], prepared: list[list[bytes]], count: int, workers: int) -> None:
     with zenoh.open(zenoh_config("client", connect=where)) as bus:
-        puts = [bus.declare_publisher(f"shift/v1/{s}/in/gaze") for s in sessions]
+        puts = [bus.declare_publisher(key_of(s, workers)) for s in sessions]
         await asyncio.sleep(1)
         begun = time.monotonic()
         period_s = CHUNK / RATE_HZ / len(sessions)
@@ -102,7 +112,7 @@ def processor_s(mesh: LiveMesh) -> dict[str, float]:
     ticks = os.sysconf("SC_CLK_TCK")
     used = {}
     for service in SERVICES:
-        pids = mesh._pids(service)
+        pids = mesh.pids_of(service)
         fields = [Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split() for pid in pids]
         used[service] = sum(int(f[11]) + int(f[12]) for f in fields) / ticks
     return used
@@ -113,11 +123,11 @@ def samples_of(client: httpx.Client, sessions: list[str]) -> list[int]:
     return [client.get(f"/v1/sessions/{s}/observation").json()["gaze"]["samples"] for s in sessions]
 
 
-def measure(people: int, seconds: float, over: str) -> dict[str, float]:
+def measure(people: int, seconds: float, over: str, workers: int) -> dict[str, float]:
     """Return the time that the mesh was behind after the last chunk, and the processor time of each service."""
     with (
         tempfile.TemporaryDirectory() as folder,
-        running_mesh(Path(folder)) as mesh,
+        running_mesh(Path(folder), "--workers", str(workers)) as mesh,
         httpx.Client(base_url=mesh.url, timeout=60.0) as client,
     ):
         names = [f"s{i}" for i in range(people)]
@@ -126,7 +136,9 @@ def measure(people: int, seconds: float, over: str) -> dict[str, float]:
         time.sleep(2)
         before = processor_s(mesh)
         where = mesh.zenoh if over == "zenoh" else mesh.url.replace("http", "ws")
-        generator = multiprocessing.get_context("spawn").Process(target=send, args=(over, where, names, seconds))
+        generator = multiprocessing.get_context("spawn").Process(
+            target=send, args=(over, where, names, seconds, workers)
+        )
         generator.start()
         generator.join()
         ended = time.monotonic()
@@ -156,11 +168,12 @@ def main() -> None:
     )
     parser.add_argument("--seconds", type=float, default=15.0, help="How long they look.")
     parser.add_argument("--over", choices=["zenoh", "websocket"], default="zenoh", help="The way of the gaze.")
+    parser.add_argument("--workers", type=int, default=1, help="Workers of each service.")
     options = parser.parse_args()
     names = [service.removeprefix("shift_").removeprefix("runtime.") for service in SERVICES]
     table = Table("people", "behind", "lost samples", *(f"{name} ms/chunk" for name in names), "sum", "JSON reference")
     for people in options.people:
-        found = measure(people, options.seconds, options.over)
+        found = measure(people, options.seconds, options.over, options.workers)
         count = people * round(options.seconds * RATE_HZ / CHUNK)
         each = [1000 * found[service] / count for service in SERVICES]
         reference = 1000 * reference_s()

@@ -21,10 +21,10 @@ PAGE = (Path(__file__).resolve().parents[2] / "docs" / "interface.md").read_text
 def paths() -> list[str]:
     """Return each method and path of the gateway's OpenAPI document."""
 
-    async def open_bus() -> Bus:
-        return MemoryBus(Hub())
+    async def open_buses() -> list[Bus]:
+        return [MemoryBus(Hub())]
 
-    document = make_app(GatewaySettings(), open_bus, ManualClock(0)).openapi()
+    document = make_app(GatewaySettings(), open_buses, ManualClock(0)).openapi()
     return [f"{method.upper()} {path}" for path, methods in document["paths"].items() for method in methods]
 
 

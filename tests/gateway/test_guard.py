@@ -12,6 +12,7 @@ import pytest
 from shift_gateway.app import make_app
 from shift_gateway.settings import GatewaySettings
 from shift_runtime.bus.memory import Hub, MemoryBus
+from shift_runtime.bus.protocol import Bus
 from shift_runtime.clock import ManualClock
 from support.gateway_mesh import Mesh, problem
 from support.live_gateway import served
@@ -26,10 +27,10 @@ LAB, EVIL = "https://lab.example.org", "http://evil.example"
 async def lab(tmp_path: Path, anyio_backend: str) -> AsyncIterator[httpx.AsyncClient]:
     """Yield a client of a gateway that pages of ``LAB`` may use, without any other service."""
 
-    async def open_bus() -> MemoryBus:
-        return MemoryBus(Hub())
+    async def open_buses() -> list[Bus]:
+        return [MemoryBus(Hub())]
 
-    app = make_app(GatewaySettings(data=tmp_path, patience_s=0.1, origins=(LAB,)), open_bus, ManualClock(0))
+    app = make_app(GatewaySettings(data=tmp_path, patience_s=0.1, origins=(LAB,)), open_buses, ManualClock(0))
     async with (
         app.router.lifespan_context(app),
         httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://127.0.0.1:8080") as client,

@@ -35,7 +35,7 @@ async def bus() -> MemoryBus:
 
 async def test_answer_is_returned_unchanged(bus: MemoryBus) -> None:
     bus.serve("shift/v1/*/rpc/decide", lambda r: r.reply(encode(ANSWER)))
-    assert await MeshClient(bus).command(DECIDE) == ANSWER
+    assert await MeshClient([bus]).command(DECIDE) == ANSWER
 
 
 async def test_command_without_a_reply_is_sent_again_with_the_same_id(bus: MemoryBus) -> None:
@@ -47,20 +47,20 @@ async def test_command_without_a_reply_is_sent_again_with_the_same_id(bus: Memor
             request.reply(encode(ANSWER))
 
     bus.serve("shift/v1/*/rpc/decide", third_time)
-    assert await MeshClient(bus).command(DECIDE) == ANSWER
+    assert await MeshClient([bus]).command(DECIDE) == ANSWER
     assert [loads(r.payload)["command_id"] for r in asked] == ["d1"] * 3
     assert len({r.payload for r in asked}) == 1
 
 
 async def test_service_that_comes_back_in_time_answers(bus: MemoryBus) -> None:
-    asking = asyncio.create_task(MeshClient(bus).command(DECIDE))
+    asking = asyncio.create_task(MeshClient([bus]).command(DECIDE))
     await asyncio.sleep(0.05)
     bus.serve(KEY, lambda r: r.reply(encode(ANSWER)))
     assert await asking == ANSWER
 
 
 async def test_missing_service_is_a_failure_that_names_it(bus: MemoryBus) -> None:
-    client = MeshClient(bus, patience_s=0.05)
+    client = MeshClient([bus], patience_s=0.05)
     with pytest.raises(Unavailable, match="the decider does not answer"):
         await client.command(DECIDE)
     with pytest.raises(Unavailable, match="the monitor does not answer"):
@@ -71,13 +71,13 @@ async def test_silent_service_is_a_failure_that_names_it(bus: MemoryBus) -> None
     silent: list[Request] = []
     bus.serve(KEY, silent.append)
     with pytest.raises(Unavailable, match="the decider does not answer"):
-        await MeshClient(bus, patience_s=0.12).command(DECIDE)
+        await MeshClient([bus], patience_s=0.12).command(DECIDE)
     assert len(silent) >= 2
 
 
 async def test_patience_grows_by_the_service_s_own_wait(bus: MemoryBus) -> None:
     bus.serve(KEY, lambda r: asyncio.get_running_loop().call_later(0.04, r.reply, encode(ANSWER)))
-    assert await MeshClient(bus, patience_s=0.0).command(DECIDE, wait_s=1.0) == ANSWER
+    assert await MeshClient([bus], patience_s=0.0).command(DECIDE, wait_s=1.0) == ANSWER
 
 
 async def test_refusal_arrives_as_the_same_error_and_is_not_retried(bus: MemoryBus) -> None:
@@ -90,7 +90,7 @@ async def test_refusal_arrives_as_the_same_error_and_is_not_retried(bus: MemoryB
 
     bus.serve(KEY, refuse)
     with pytest.raises(Conflict, match="asked before") as found:
-        await MeshClient(bus).command(DECIDE)
+        await MeshClient([bus]).command(DECIDE)
     assert found.value.errors == errors
     assert len(asked) == 1
 
@@ -100,31 +100,31 @@ async def test_refusal_arrives_as_the_same_error_and_is_not_retried(bus: MemoryB
 async def test_invalid_answer_is_ignored(bus: MemoryBus, junk: bytes, ok: bool) -> None:
     bus.serve(KEY, lambda r: r.reply(junk) if ok else r.refuse(junk))
     with pytest.raises(Unavailable):
-        await MeshClient(bus, patience_s=0.05).command(DECIDE)
+        await MeshClient([bus], patience_s=0.05).command(DECIDE)
     bus.serve(KEY, lambda r: r.reply(encode(ANSWER)))
-    assert await MeshClient(bus).command(DECIDE) == ANSWER
+    assert await MeshClient([bus]).command(DECIDE) == ANSWER
 
 
 async def test_session_that_is_not_an_id_is_refused_before_a_request(bus: MemoryBus) -> None:
     chunk = GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["left"])
     for hostile in ("**", "*", "a/b", "../x", "a\0", "x" * 64, ""):
         with pytest.raises(MalformedMessage):
-            await MeshClient(bus).gaze(hostile, chunk)
+            await MeshClient([bus]).gaze(hostile, chunk)
 
 
 async def test_health_is_none_and_metrics_are_empty_without_an_answer(bus: MemoryBus) -> None:
-    client = MeshClient(bus)
-    assert await client.health("monitor", 0.02) is None
-    assert await client.metrics("monitor", 0.02) == b""
+    client = MeshClient([bus])
+    assert (await client.healths(0.02))["monitor"] is None
+    assert await client.metrics("monitor", 0.02) == []
     bus.serve("shift/v1/@service/monitor/health", lambda r: r.reply(b"junk"))
     bus.serve("shift/v1/@service/monitor/metrics", lambda r: r.refuse(b"no"))
-    assert await client.health("monitor", 0.02) is None
-    assert await client.metrics("monitor", 0.02) == b""
+    assert (await client.healths(0.02))["monitor"] is None
+    assert await client.metrics("monitor", 0.02) == []
     healthy = Health(service="monitor", ready=True)
     bus.serve("shift/v1/@service/monitor/health", lambda r: r.reply(encode(healthy)))
     bus.serve("shift/v1/@service/monitor/metrics", lambda r: r.reply(b"# text"))
-    assert await client.health("monitor") == healthy
-    assert await client.metrics("monitor") == b"# text"
+    assert (await client.healths(0.1))["monitor"] == healthy
+    assert await client.metrics("monitor") == [b"# text"]
 
 
 async def test_command_is_carried_out_once_even_if_attempts_time_out(tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ async def test_command_is_carried_out_once_even_if_attempts_time_out(tmp_path: P
     rig.recorder.publish(session(), config())
     rig.start()
     await rig.ready()
-    client = MeshClient(rig.bus)
+    client = MeshClient([rig.bus])
     answer = await client.command(DECIDE.model_copy(update={"task": "after-2"}), wait_s=1.0)
     assert answer.result["timed_out"] is True
     await until(lambda: rig.outbox() == [(1, "decision d1")])

@@ -24,15 +24,15 @@ MARKER = Marker(session="s1", stamp=NOW, marker_id="m1", text="a note")
 async def model() -> AsyncIterator[ReadModel]:
     """Yield a read model that no owner answers."""
     bus = MemoryBus(Hub())
-    model = ReadModel(bus, lambda reason: None)
+    model = ReadModel([bus], lambda reason: None)
     yield model
     await bus.close()
 
 
 def delivered(model: ReadModel, seq: int, fact: Fact) -> None:
     """Deliver a fact of the recorder, as the reader would."""
-    model.reader.cursors[fact.session, "recorder"] = seq
-    model.reader.deliver(ReadFact("recorder", seq, fact, fact.model_dump_json()))
+    model.reader.of(fact.session).cursors[fact.session, "recorder"] = seq
+    model.reader.of(fact.session).deliver(ReadFact("recorder", seq, fact, fact.model_dump_json()))
 
 
 def pulled(model: ReadModel, monkeypatch: pytest.MonkeyPatch, then: Any = None) -> list[tuple[str, ...]]:
@@ -65,7 +65,7 @@ async def test_listener_gets_every_fact_even_if_another_one_leaves(model: ReadMo
 async def test_fact_before_its_session_is_read_again(model: ReadModel) -> None:
     delivered(model, 1, MARKER)
     assert "s1" not in model.views
-    assert model.reader.cursors["s1", "recorder"] == 0
+    assert model.reader.cursor("s1", "recorder") == 0
 
 
 async def test_wait_ends_with_a_notification(model: ReadModel, monkeypatch: pytest.MonkeyPatch) -> None:

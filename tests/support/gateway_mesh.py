@@ -32,7 +32,7 @@ from shift_runtime.journal import Journal
 from shift_runtime.metrics import Metrics
 from shift_runtime.service.core import Core
 from shift_runtime.service.loop import Worker
-from shift_runtime.settings import MeshSettings
+from shift_runtime.settings import ServiceSettings
 
 CORES: dict[str, Core[Any]] = {core.name: core for core in (RECORDER, MONITOR, DECIDER, LEARNER)}
 START_NS = 1_700_000_000_000_000_000
@@ -73,7 +73,7 @@ class Mesh:
         """Start a service on its journal."""
         bus = MemoryBus(self.hub)
         journal = Journal(self.data / "state" / f"{name}.sqlite", name, CORES[name].lookups)
-        extend = partial(extend_recorder, settings=MeshSettings(data=self.data)) if name == "recorder" else None
+        extend = partial(extend_recorder, settings=ServiceSettings(data=self.data)) if name == "recorder" else None
         worker: Worker[Any] = Worker(CORES[name], bus, journal, self.clock, Metrics(name), extend)
         self.services[name] = Service(worker, asyncio.create_task(worker.run()), bus, journal)
 
@@ -168,10 +168,10 @@ async def running_mesh(data: Path, patience_s: float = 1.0) -> AsyncIterator[Mes
     """Run the mesh until the context is left."""
     hub, clock = Hub(), ManualClock(START_NS)
 
-    async def open_bus() -> Bus:
-        return MemoryBus(hub)
+    async def open_buses() -> list[Bus]:
+        return [MemoryBus(hub)]
 
-    app = make_app(GatewaySettings(data=data, patience_s=patience_s), open_bus, clock)
+    app = make_app(GatewaySettings(data=data, patience_s=patience_s), open_buses, clock)
     async with AsyncExitStack() as stack:
         http = httpx.AsyncClient(transport=httpx.ASGITransport(app), base_url="http://127.0.0.1", timeout=None)
         mesh = Mesh(data, hub, clock, app, await stack.enter_async_context(http))

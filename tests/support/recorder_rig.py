@@ -16,7 +16,7 @@ from shift_runtime.bus.protocol import Reply, Request
 from shift_runtime.clock import ManualClock
 from shift_runtime.metrics import Metrics
 from shift_runtime.service.loop import Worker
-from shift_runtime.settings import MeshSettings
+from shift_runtime.settings import ServiceSettings
 from shift_schemas.codec import decode, encode
 from shift_schemas.errors import Problem
 from shift_schemas.keys import CommandKey, ServiceKey, build_key
@@ -62,7 +62,7 @@ class RecorderRig(RunningWorker):
     def start(self) -> None:
         self.journal = FullDisk(self.data / "state" / "recorder.sqlite", "recorder")
         self.own_bus, self.metrics = MemoryBus(self.hub), Metrics("recorder")
-        settings = MeshSettings(data=self.data)
+        settings = ServiceSettings(data=self.data)
         self.worker: Worker[RecorderState] = Worker(
             CORE, self.own_bus, self.journal, ManualClock(5), self.metrics, partial(extend, settings=settings)
         )

@@ -43,11 +43,12 @@ class LiveMesh:
 
     def pid_of(self, package: str) -> int:
         """Return the process id of a service, found by its package in the command line."""
-        found = self._pids(package)
+        found = self.pids_of(package)
         assert len(found) == 1, f"{package}: {found}"
         return found[0]
 
-    def _pids(self, package: str) -> list[int]:
+    def pids_of(self, package: str) -> list[int]:
+        """Return the process ids of a service's workers."""
         return [
             int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and self._is(entry, package)
         ]
@@ -63,7 +64,7 @@ class LiveMesh:
     def kill(self, package: str) -> int:
         """Kill a service with kill -9 once it is back from the last kill; return its process id."""
         end = time.monotonic() + READY_WITHIN_S
-        while not self._pids(package) and time.monotonic() < end:
+        while not self.pids_of(package) and time.monotonic() < end:
             time.sleep(0.01)
         pid = self.pid_of(package)
         os.kill(pid, signal.SIGKILL)

@@ -51,7 +51,8 @@ class Session(Fact):
     replay_of: str = Field(default="", description="Name of the recording that this session replays.")
     software: str = Field(default="", description="Version of shift-mesh.")
     revision: str = Field(default="", description="Git revision of shift-mesh, where known.")
-    format: Count = Field(default=1, description="Which facts and fields the session records; today 3.")
+    shard: str = Field(default="", description="The shard of a mesh with several, such as 0/4; it never changes.")
+    format: Count = Field(default=1, description="Which facts and fields the session records; today 4.")
     warnings: Warnings = Field(default=[], description="What was accepted at its start but may be a mistake.")
 
 
@@ -94,8 +95,8 @@ class StartSession(Command):
     fixed_id = START_ID
     id_field = "session"
     wording = RepeatWording("session {session} is there already", "start", "Choose another session id")
-    internal = frozenset({"replay_of", "software", "revision", "format", "warnings"})
-    not_content = frozenset({"need", "command_id", "format", "warnings"})
+    internal = frozenset({"replay_of", "software", "revision", "shard", "format", "warnings"})
+    not_content = frozenset({"need", "command_id", "shard", "format", "warnings"})
 
     participant: Id = Field(description="Pseudonym of the participant.")
     session: Id = Field(description="Left out: a new id.")
@@ -105,6 +106,7 @@ class StartSession(Command):
     replay_of: str = ""
     software: str = ""
     revision: str = ""
+    shard: str = ""
     format: Count = FORMAT
     warnings: Warnings = Field(default=[], description="What was found when the study was read.")
 

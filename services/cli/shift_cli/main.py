@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from shift_schemas.shards import MOST_SHARDS
 from shift_simulator import commands as evaluate_commands
 
 from shift_cli import (
@@ -74,16 +75,23 @@ def up(
         str | None,
         typer.Option(help="Endpoint of a router that runs already; then none is started.", envvar="SHIFT_ROUTER"),
     ] = None,
+    workers: Annotated[
+        int,
+        typer.Option(
+            help="Workers of each service, for many people at a time; see docs/scaling.md.", min=1, max=MOST_SHARDS
+        ),
+    ] = 1,
 ) -> None:
     """Run the mesh on this machine until Ctrl-C.
 
     \b
     shift-mesh up                       # at http://127.0.0.1:8080
     shift-mesh up --demo --port 9000    # with a simulated person in session demo
+    shift-mesh up --workers 4           # four workers of each service, on a machine with many cores
     """
     from shift_cli.up import run_up
 
-    raise typer.Exit(run_up(demo, host, port, zenoh, data, router))
+    raise typer.Exit(run_up(demo, host, port, zenoh, data, router, workers))
 
 
 @app.command()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from shift_schemas.registry import SUBJECTS
+from shift_schemas.shards import MOST_SHARDS
 
 if TYPE_CHECKING:
     from shift_recording.replay import Extent, Pacer, Publish, Replay
@@ -40,6 +41,9 @@ def replay(
     zenoh: Annotated[
         str, typer.Option(help="Endpoint of the mesh's router.", envvar="SHIFT_ZENOH")
     ] = "tcp/127.0.0.1:7447",
+    shards: Annotated[
+        int, typer.Option(help="The number of shards of the mesh.", envvar="SHIFT_SHARDS", min=1, max=MOST_SHARDS)
+    ] = 1,
 ) -> None:
     """Publish the messages of a recording again, with their own timing, marked as a replay.
 
@@ -59,7 +63,7 @@ def replay(
     wanted = tuple(name.strip() for name in topics.split(",") if name.strip()) or SUBJECTS
     plan = Replay(file, session or replay_session(extent.session), speed, start_offset, wanted, loop, longest_pause)
     _check_plan(plan, extent)
-    published = asyncio.run(_run(plan, extent, zenoh, start_paused))
+    published = asyncio.run(_run(plan, extent, zenoh, start_paused, shards))
     typer.echo(f"{published} messages replayed under session {plan.session}", err=True)
 
 
@@ -77,7 +81,7 @@ def _check_plan(plan: Replay, extent: Extent) -> None:
         )
 
 
-async def _run(plan: Replay, extent: Extent, zenoh: str, start_paused: bool) -> int:
+async def _run(plan: Replay, extent: Extent, zenoh: str, start_paused: bool, shards: int) -> int:
     """Replay until the end or Ctrl-C, and return the number of messages."""
     import asyncio
     import contextlib
@@ -85,8 +89,10 @@ async def _run(plan: Replay, extent: Extent, zenoh: str, start_paused: bool) -> 
 
     from shift_recording.replay import Pacer, check_free
     from shift_runtime.bus.zenoh import ZenohBus
+    from shift_schemas.shards import Shard, shard_of
 
-    bus = await ZenohBus.open(zenoh, LISTEN)
+    shard = Shard(shard_of(plan.session, shards), shards)
+    bus = await ZenohBus.open(zenoh, LISTEN, shard.name)
     loop = asyncio.get_running_loop()
     playing: asyncio.Task[int] | None = None
     counted = [0]

@@ -41,6 +41,8 @@ class Program:
     name: str
     module: str
     stops: int
+    environment: dict[str, str] = field(default_factory=dict)
+    """Variables of this process alone."""
     pid: int | None = None
     started: float = 0.0
     deaths: int = 0
@@ -50,19 +52,24 @@ class Program:
     """Whether it ran for a while: then its settings are valid, and a later end is restarted, as after a full disk."""
 
 
-def programs(demo: bool, router: bool) -> list[Program]:
-    """Return the processes of the mesh in the order of their start."""
-    mesh = [
-        Program("router", "shift_runtime.router", 5),
-        Program("recorder", "shift_recorder", 3),
-        Program("monitor", "shift_monitor", 4),
-        Program("decider", "shift_decider", 4),
-        Program("learner", "shift_learner", 4),
-        Program("gateway", "shift_gateway", 2),
-        Program("simulator", "shift_simulator", 1),
-    ]
-    left_out = ({"simulator"} if not demo else set()) | ({"router"} if not router else set())
-    return [p for p in mesh if p.name not in left_out]
+def programs(demo: bool, router: bool, workers: int = 1) -> list[Program]:
+    """Return the processes of the mesh in the order of their start, with so many workers of each service."""
+    mesh = [Program("router", "shift_runtime.router", 5)] if router else []
+    for index in range(workers):
+        mesh += [
+            _worker("recorder", 3, index, workers),
+            _worker("monitor", 4, index, workers),
+            _worker("decider", 4, index, workers),
+            _worker("learner", 4, index, workers),
+        ]
+    mesh.append(Program("gateway", "shift_gateway", 2, {"SHIFT_SHARDS": str(workers)}))
+    return [*mesh, Program("simulator", "shift_simulator", 1)] if demo else mesh
+
+
+def _worker(service: str, stops: int, index: int, workers: int) -> Program:
+    shard = f"{index}/{workers}"
+    name = f"{service} {shard}" if workers > 1 else service
+    return Program(name, f"shift_{service}", stops, {"SHIFT_SHARD": shard})
 
 
 @dataclass
@@ -148,6 +155,7 @@ class Supervisor:
             ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
             signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
             setproctitle.setproctitle(f"python -m {program.module}")
+            os.environ |= program.environment
             self._entries[program.name]()
             code = 0
         except SystemExit as e:

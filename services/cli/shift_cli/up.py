@@ -7,14 +7,16 @@ import http.client
 import os
 import socket
 import time
+from collections import Counter
 from pathlib import Path
 from typing import IO
 
 from rich.console import Console
 from shift_runtime.endpoints import parse_endpoint
-from shift_runtime.journal_schema import check_journals
+from shift_runtime.journal_schema import check_journals, check_no_live_sessions
 from shift_runtime.settings import read_settings
 from shift_schemas.errors import InvalidSettings, shorten
+from shift_schemas.shards import Shard
 
 from shift_cli.supervisor import Program, Supervisor, programs
 
@@ -22,7 +24,7 @@ LOCAL = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 console = Console(stderr=True, highlight=False)
 
 
-def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str | None) -> int:
+def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str | None, workers: int) -> int:
     """Run the mesh until Ctrl-C or SIGTERM; return the exit code.
 
     Raises
@@ -36,6 +38,7 @@ def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str
     read_settings()
     lock = _lock(data)
     check_journals(data)
+    check_no_live_sessions(data / "state", "recorder", Shard(0, workers))
     _check_free(host, port, "--port")
     if router is None:
         _check_free(*endpoint, "--zenoh")
@@ -45,7 +48,7 @@ def run_up(demo: bool, host: str, port: int, zenoh: str, data: Path, router: str
         "SHIFT_ZENOH": router or zenoh, "SHIFT_ROUTER_LISTEN": zenoh,
     }  # fmt: skip
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # a thread in the supervisor would not survive the fork
-    mesh = programs(demo, router is None)
+    mesh = programs(demo, router is None, workers)
     announcer = _Announcer(LOCAL.get(host, host), port, url, mesh)
     console.print(f"SHIFT mesh: data in {data}/, gateway at {url}", soft_wrap=True)
     code = Supervisor(mesh, lambda text: console.print(text, soft_wrap=True), announcer.tick).run()
@@ -67,7 +70,9 @@ class _Announcer:
             return
         self._done = True
         took = time.monotonic() - self._since
-        names = ", ".join(p.name for p in self._mesh)
+        names = ", ".join(dict.fromkeys(p.name.partition(" ")[0] for p in self._mesh))
+        workers = max(Counter(p.module for p in self._mesh).values())
+        names += f"; {workers} workers of each service" if workers > 1 else ""
         console.print(f"ready in {took:.1f} s: {names}\nopen {self._url}  -  stop with Ctrl-C", soft_wrap=True)
 
     def _ready(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 
 from fastapi import FastAPI, Request, Response
@@ -25,17 +25,17 @@ from shift_gateway.settings import GatewaySettings
 from shift_gateway.studies import add_studies
 from shift_gateway.web.late_mount import PageRoute
 
-Opener = Callable[[], Awaitable[Bus]]
+Opener = Callable[[], Awaitable[Sequence[Bus]]]
 
 
-def make_app(settings: GatewaySettings, open_bus: Opener, clock: Clock) -> FastAPI:
-    """Return the application. It calls ``open_bus`` when it starts, in its own event loop."""
+def make_app(settings: GatewaySettings, open_buses: Opener, clock: Clock) -> FastAPI:
+    """Return the application. It calls ``open_buses`` when it starts, in its own event loop."""
     gateway = Gateway(settings)
     pages = PageRoute(gateway)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with gateway.on(await open_bus(), clock):
+        async with gateway.on(await open_buses(), clock):
             yield
             await pages.close()
 

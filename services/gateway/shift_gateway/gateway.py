@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -38,32 +38,33 @@ class Gateway:
         return self.settings.data / "recordings"
 
     @asynccontextmanager
-    async def on(self, bus: Bus, clock: Clock) -> AsyncIterator[None]:
-        """Read the mesh and answer on the bus, until the context is left."""
-        self.mesh = MeshClient(bus, self.settings.patience_s)
-        self.read_model = ReadModel(bus, self.metrics.dropped, self.metrics.link_lost)
+    async def on(self, buses: Sequence[Bus], clock: Clock) -> AsyncIterator[None]:
+        """Read the mesh and answer on the bus of each shard, until the context is left."""
+        self.mesh = MeshClient(buses, self.settings.patience_s)
+        self.read_model = ReadModel(buses, self.metrics.dropped, self.metrics.link_lost)
         self.api = GatewayApi(self.mesh, self.read_model, clock)
-        bus.serve(build_key(ServiceKey("gateway", "health")), lambda r: r.reply(encode(self.health())))
-        bus.serve(build_key(ServiceKey("gateway", "metrics")), lambda r: r.reply(self.metrics_text()))
-        bus.token(build_key(ServiceKey("gateway", "alive")))
+        for bus in buses:
+            bus.serve(build_key(ServiceKey("gateway", "health")), lambda r: r.reply(encode(self.health())))
+            bus.serve(build_key(ServiceKey("gateway", "metrics")), lambda r: r.reply(self.metrics_text()))
+            bus.token(build_key(ServiceKey("gateway", "alive")))
         self.read_model.reader.start()
         reading = asyncio.create_task(self.read_model.reader.run())
         try:
             yield
         finally:
             reading.cancel()
-            await bus.close()
+            await asyncio.gather(*(bus.close() for bus in buses))
 
     def metrics_text(self) -> bytes:
         """Return the gateway's own metrics."""
         for owner in OWNERS:
-            self.metrics.silent(owner, self.read_model.reader.links.silent_s(owner))
+            self.metrics.silent(owner, self.read_model.reader.silent_s(owner))
         return self.metrics.text()
 
     def health(self) -> Health:
         """Return the gateway's own health."""
         missing = self.read_model.missing
-        unreached = self.read_model.reader.links.unreached
+        unreached = self.read_model.reader.unreached
         detail = f"waits for the {', the '.join(missing)}" if missing else ""
         if not detail and unreached:
             detail = f"the gateway does not reach the {', the '.join(unreached)}"

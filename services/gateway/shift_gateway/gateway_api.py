@@ -123,7 +123,7 @@ class GatewayApi(MeshApi):
     async def _current(self, session: str, owner: str) -> SessionView:
         """Return the session's view. Read the journals of a session that ended before this gateway started."""
         view = await self.read_model.view(session)
-        if has_ended(view.fact.state) and (session, owner) not in self.read_model.reader.cursors:
+        if has_ended(view.fact.state) and self.read_model.reader.cursor(session, owner) is None:
             silent = await self.read_model.reader.pull_all(("monitor", "decider", "learner"), session)
             if silent:
                 raise Unavailable(f"the {silent[0]} does not answer")

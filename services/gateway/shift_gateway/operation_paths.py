@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 
 from fastapi import FastAPI, Response
 from fastapi.responses import JSONResponse
@@ -24,13 +25,12 @@ def add_operations(app: FastAPI, gateway: Gateway) -> None:
     @app.get("/readyz", tags=["operations"])
     async def readyz() -> Response:
         """Return whether every service answers and is ready; names those that are not."""
-        answers = await asyncio.gather(*(gateway.mesh.health(owner) for owner in OWNERS))
-        content = readiness(dict(zip(OWNERS, answers, strict=True)), gateway.health())
+        content = readiness(await gateway.mesh.healths(), gateway.health())
         return JSONResponse(content, 200 if content["ready"] else 503)
 
     @app.get("/metrics", tags=["operations"])
     async def metrics() -> Response:
         """Return the Prometheus metrics of all services."""
         texts = await asyncio.gather(*(gateway.mesh.metrics(service) for service in (*OWNERS, "ros2_bridge")))
-        text = merged_metrics([gateway.metrics_text(), *(t for t in texts if t)])
+        text = merged_metrics([gateway.metrics_text(), *itertools.chain.from_iterable(texts)])
         return Response(text, media_type="text/plain; version=0.0.4; charset=utf-8")

@@ -8,7 +8,7 @@ import sys
 import structlog
 import uvicorn
 from shift_runtime.bus.protocol import Bus
-from shift_runtime.bus.zenoh import ZenohBus
+from shift_runtime.bus.zenoh import open_buses
 from shift_runtime.clock import SystemClock
 from shift_runtime.logs import configure_logs
 from shift_runtime.process import leave
@@ -34,10 +34,10 @@ def run_gateway() -> None:
         sys.exit(2)
     configure_logs("gateway", settings)
 
-    async def open_bus() -> Bus:
-        return await ZenohBus.open(settings.zenoh, settings.listen)
+    async def open_all() -> list[Bus]:
+        return [*await open_buses(settings.zenoh, settings.listen, settings.shards)]
 
-    app = make_app(settings, open_bus, SystemClock())
+    app = make_app(settings, open_all, SystemClock())
     log.info("started", url=f"http://{settings.host}:{settings.port}", router=settings.zenoh)
     for number in (signal.SIGINT, signal.SIGTERM):  # uvicorn raises the signal again at its end; exit with 0
         signal.signal(number, lambda *_: None)

@@ -6,12 +6,12 @@ from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 from pydantic_settings import NoDecode
-from shift_runtime.settings import MeshSettings
+from shift_runtime.settings import ClientSettings
 
 from shift_gateway.origins import host_names, origin_names
 
 
-class GatewaySettings(MeshSettings):
+class GatewaySettings(ClientSettings):
     """The addresses of the gateway, and who may use it."""
 
     host: str = Field(default="127.0.0.1", description="Address that the gateway listens on.")

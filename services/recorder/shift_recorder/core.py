@@ -120,7 +120,7 @@ def _start(state: RecorderState | None, command: StartSession, now: Stamp) -> St
         session=command.session, stamp=now, participant=command.participant, study=study.study,
         condition=command.condition, seed=seed_of(command.session) if command.seed is None else command.seed,
         state=LIVE, started=now, replay_of=command.replay_of,
-        software=command.software, revision=command.revision, format=command.format,
+        software=command.software, revision=command.revision, shard=command.shard, format=command.format,
         warnings=_start_warnings(study, command),
     )  # fmt: skip
     config = Config(session=command.session, stamp=now, version=1, study=study_json(in_force))

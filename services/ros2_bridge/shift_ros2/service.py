@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import structlog
-from shift_runtime.bus.zenoh import ZenohBus
+from shift_runtime.bus.zenoh import ZenohBus, open_buses
 from shift_runtime.clock import SystemClock
 from shift_runtime.logs import configure_logs
 from shift_runtime.mesh_api import MeshApi
@@ -46,16 +46,17 @@ async def serve(settings: BridgeSettings) -> None:
     """Serve the mesh and ROS until a signal arrives."""
     stop = asyncio.Event()
     _on_signal(stop.set)
-    bus = await ZenohBus.open(settings.zenoh, settings.listen)
+    buses = await open_buses(settings.zenoh, settings.listen, settings.shards)
     metrics = Metrics(SERVICE)
-    read_model = ReadModel(bus, metrics.dropped, metrics.link_lost)
-    bridge = Bridge(settings, MeshApi(MeshClient(bus, settings.patience_s), read_model), metrics, SystemClock())
+    read_model = ReadModel(buses, metrics.dropped, metrics.link_lost)
+    bridge = Bridge(settings, MeshApi(MeshClient(buses, settings.patience_s), read_model), metrics, SystemClock())
     read_model.reader.start()
     pulling = asyncio.create_task(read_model.reader.run())
     try:
         bridge.backend = await open_backend(settings, bridge)
         _on_signal(stop.set)  # rclpy's executor replaces the signal handlers
-        _serve_health(bus, bridge, metrics)
+        for bus in buses:
+            _serve_health(bus, bridge, metrics)
         log.info(
             "started", node=settings.node, namespace=settings.namespace, session=bridge.session,
             backend=settings.backend, mesh=settings.zenoh,
@@ -73,7 +74,7 @@ async def serve(settings: BridgeSettings) -> None:
         await bridge.backend.close()
     finally:
         pulling.cancel()
-        await bus.close()
+        await asyncio.gather(*(bus.close() for bus in buses))
         log.info("stopped")
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
-from shift_runtime.settings import MeshSettings, read_settings
+from shift_runtime.settings import ClientSettings, read_settings
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.ids import Id, is_id, not_an_id
 
@@ -21,7 +21,7 @@ DEFAULT_SESSION = "ros"
 Reliability = Literal["best_effort", "reliable"]
 
 
-class BridgeSettings(MeshSettings):
+class BridgeSettings(ClientSettings):
     """The settings of the bridge. Each name is a ROS parameter, and ``SHIFT_NAME`` in the environment."""
 
     backend: Literal["native", "rclpy"] = Field(default="native", description="How it speaks to ROS.")

@@ -1,6 +1,6 @@
 """``python -m shift_runtime.healthcheck SERVICE``: exit with 0 if the service answers and is ready.
 
-Containers run it every few seconds, so it imports only Zenoh and the standard library. It asks a service over Zenoh,
+Containers run it every few seconds, so it imports little besides Zenoh. It asks a service over Zenoh,
 through the loop that does the service's work; it asks the gateway for ``/readyz``, and connects to the router. The
 simulated person is healthy if the gateway (``SHIFT_URL``) answers.
 """
@@ -30,7 +30,7 @@ def main(arguments: list[str]) -> int:
         sys.stderr.write(f"the {arguments[0]} does not answer: {e or type(e).__name__}\n")
         return 1
     except ValueError as e:
-        sys.stderr.write(f"a port or address in the environment (SHIFT_...) is wrong: {e}\n")
+        sys.stderr.write(f"a port, address or shard in the environment (SHIFT_...) is wrong: {e}\n")
         return 2
     return 0 if healthy else 1
 
@@ -59,10 +59,14 @@ def _answers(host: str, port: int, path: str) -> bool:
 
 def _service(name: str) -> bool:
     import zenoh
+    from shift_schemas.shards import parse_shard
 
     from shift_runtime.bus.zenoh_config import zenoh_config
 
-    config = zenoh_config("client", connect=os.environ.get("SHIFT_ZENOH", "tcp/127.0.0.1:7447"), timeout_ms=2000)
+    shard = parse_shard(os.environ.get("SHIFT_SHARD", "0/1"))
+    config = zenoh_config(
+        "client", connect=os.environ.get("SHIFT_ZENOH", "tcp/127.0.0.1:7447"), timeout_ms=2000, namespace=shard.name
+    )
     try:
         session = zenoh.open(config)
     except zenoh.ZError as e:

@@ -75,11 +75,19 @@ def same_content(before: str, now: str) -> bool:
 class Journal:
     """The journal of one service. It must be used from one thread."""
 
-    def __init__(self, path: Path, owner: str, lookups: Mapping[str, tuple[str, ...]] | None = None) -> None:
+    def __init__(
+        self,
+        path: Path,
+        owner: str,
+        lookups: Mapping[str, tuple[str, ...]] | None = None,
+        data: Path | None = None,
+    ) -> None:
         """Open the file, or create it; bring an older one to the current schema.
 
         Parameters
         ----------
+        data
+            The data folder of the mesh; left out, the folder above that of the file.
         lookups
             By subject, the fields by which :meth:`recorded` finds its facts. Each has an index, which is
             derived from the facts and thus not part of the schema's version.
@@ -93,6 +101,7 @@ class Journal:
         """
         self.owner = owner
         self.path = path
+        self.data = data if data is not None else path.parent.parent
         self._lookups = lookups or {}
         self._open(path)
         self._closed = {s for (s,) in self._db.execute("SELECT session FROM state WHERE closed = 1")}
@@ -102,7 +111,7 @@ class Journal:
     def _open(self, path: Path) -> None:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            self.mesh = mesh_id(path.parent)
+            self.mesh = mesh_id(self.data / "state" if self.data != path.parent.parent else path.parent)
             self._db = sqlite3.connect(path, isolation_level=None, timeout=5.0)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")

@@ -6,12 +6,14 @@ one transaction, so that a crash leaves the old version whole.
 
 from __future__ import annotations
 
+import re
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
 from shift_schemas.errors import InvalidSettings
+from shift_schemas.shards import Shard, every_shard
 
 Migration = Callable[[sqlite3.Connection], None]
 
@@ -96,12 +98,43 @@ def check_journals(data: Path) -> None:
     NewerJournal
         A newer shift-mesh wrote one of them.
     """
-    for path in sorted((data / "state").glob("*.sqlite")):
+    for path in sorted((data / "state").rglob("*.sqlite")):
         try:
             with closing(sqlite3.connect(f"file:{path.absolute()}?mode=rw", uri=True)) as db:
                 _check_version(db, path, len(MIGRATIONS))
         except sqlite3.Error:
             continue
+
+
+def check_no_live_sessions(state: Path, service: str, shard: Shard) -> None:
+    """Check that no session is live in this service's journals of another number of shards: it would be lost from view.
+
+    Raises
+    ------
+    InvalidSettings
+        There is such a session.
+    """
+    own = {state / other.name / f"{service}.sqlite" for other in every_shard(shard.count)}
+    for path in sorted({state / f"{service}.sqlite", *state.glob(f"shard-*/{service}.sqlite")} - own):
+        live = _live_sessions(path)
+        if live:
+            count = re.fullmatch(r"shard-\d+-of-(\d+)", path.parent.name)
+            workers = int(count[1]) if count else 1
+            raise InvalidSettings(
+                f"the data folder {state.parent} has a live session of a mesh with {workers} shard"
+                f"{'s' if workers > 1 else ''}: {live[0]}; a session stays in its shard, so start the mesh with "
+                f"{workers} again (--workers {workers}) and end it, or use another data folder"
+            )
+
+
+def _live_sessions(path: Path) -> list[str]:
+    if not path.exists():
+        return []
+    try:
+        with closing(sqlite3.connect(f"file:{path.absolute()}?mode=rw", uri=True)) as db:
+            return [session for (session,) in db.execute("SELECT session FROM state WHERE closed = 0 LIMIT 1")]
+    except sqlite3.Error:  # its service says why when it opens the journal
+        return []
 
 
 def _check_version(db: sqlite3.Connection, path: Path, known: int) -> None:

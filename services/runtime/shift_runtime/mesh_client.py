@@ -7,11 +7,14 @@ failure that names the service, never a success.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 
 from shift_schemas.codec import M, decode, encode
 from shift_schemas.errors import MalformedMessage, Problem, Unavailable
 from shift_schemas.keys import CommandKey, ServiceKey, StreamKey, build_key
 from shift_schemas.messages import Answer, Command, GazeChunk, Health
+from shift_schemas.registry import OWNERS
+from shift_schemas.shards import Shard, shard_of
 
 from shift_runtime.bus.protocol import Bus, Reply, first_answer
 from shift_runtime.claim import healths_of, one_health
@@ -24,10 +27,18 @@ PAUSE_S = 0.05
 
 
 class MeshClient:
-    """Asks services over ``bus``. ``patience_s`` is how long a service may take to come back."""
+    """Asks the services of every shard.
 
-    def __init__(self, bus: Bus, patience_s: float = 4.0) -> None:
-        self.bus = bus
+    Parameters
+    ----------
+    buses
+        The bus of each shard.
+    patience_s
+        How long a service may take to come back, s.
+    """
+
+    def __init__(self, buses: Sequence[Bus], patience_s: float = 4.0) -> None:
+        self.buses = buses
         self.patience_s = patience_s
 
     async def command(self, command: Command, wait_s: float = 0.0) -> Answer:
@@ -44,33 +55,54 @@ class MeshClient:
             The service's refusal, or :class:`Unavailable` if it did not answer.
         """
         key = build_key(CommandKey(command.session, command.procedure))
-        return await self._ask(key, encode(command), command.owner, wait_s)
+        return await self._ask(command.session, key, encode(command), command.owner, wait_s)
+
+    def bus_of(self, session: str) -> Bus:
+        """Return the bus of the session's shard."""
+        return self.buses[shard_of(session, len(self.buses))]
 
     async def gaze(self, session: str, chunk: GazeChunk) -> Answer:
         """Send a chunk to the monitor; it answers once the chunk is committed."""
-        return await self._ask(build_key(StreamKey(session, chunk.stream)), encode(chunk), chunk.owner, 0.0)
+        key = build_key(StreamKey(session, chunk.stream))
+        return await self._ask(session, key, encode(chunk), chunk.owner, 0.0)
 
-    async def health(self, service: str, timeout_s: float = 1.0) -> Health | None:
-        """Return the health that the service's worker reports; None if it does not answer."""
-        replies = await self.bus.get(build_key(ServiceKey(service, "health")), timeout_s=timeout_s)
+    async def healths(self, timeout_s: float = 1.0) -> dict[str, Health | None]:
+        """Return the health of each owner's worker, None for one that does not answer.
+
+        With several shards the names are those of the workers, such as ``monitor 0/4``.
+        """
+        asked = [(owner, index) for index in range(len(self.buses)) for owner in OWNERS]
+        found = await asyncio.gather(*(self._health(self.buses[index], owner, timeout_s) for owner, index in asked))
+        return {self._worker(owner, index): health for (owner, index), health in zip(asked, found, strict=True)}
+
+    async def metrics(self, service: str, timeout_s: float = 1.0) -> list[bytes]:
+        """Return the metrics of each of the service's workers that answers."""
+        key = build_key(ServiceKey(service, "metrics"))
+        asked = [first_answer(bus, key, timeout_s=timeout_s, read=_payload_of) for bus in self.buses]
+        return [text for text in await asyncio.gather(*asked) if text]
+
+    def _worker(self, owner: str, index: int) -> str:
+        return owner if len(self.buses) == 1 else f"{owner} {Shard(index, len(self.buses))}"
+
+    async def _health(self, bus: Bus, service: str, timeout_s: float) -> Health | None:
+        replies = await bus.get(build_key(ServiceKey(service, "health")), timeout_s=timeout_s)
         return one_health(service, list(healths_of(replies)))
 
-    async def metrics(self, service: str, timeout_s: float = 1.0) -> bytes:
-        """Return the service's metrics; empty if it does not answer."""
-        key = build_key(ServiceKey(service, "metrics"))
-        found = await first_answer(self.bus, key, timeout_s=timeout_s, read=lambda r: r.payload if r.ok else None)
-        return found or b""
-
-    async def _ask(self, key: str, payload: bytes, owner: str, wait_s: float) -> Answer:
+    async def _ask(self, session: str, key: str, payload: bytes, owner: str, wait_s: float) -> Answer:
+        bus = self.bus_of(session)
         deadline = Deadline(self.patience_s + wait_s)
         while (left_s := deadline.left_s) > 0:
-            answer = await first_answer(self.bus, key, payload, timeout_s=min(left_s, ATTEMPT_S), read=_answer_of)
+            answer = await first_answer(bus, key, payload, timeout_s=min(left_s, ATTEMPT_S), read=_answer_of)
             if isinstance(answer, Problem):
                 raise answer.error()
             if isinstance(answer, Answer):
                 return answer
             await asyncio.sleep(PAUSE_S)
         raise Unavailable(f"the {owner} does not answer")
+
+
+def _payload_of(reply: Reply) -> bytes | None:
+    return reply.payload if reply.ok else None
 
 
 def _answer_of(reply: Reply) -> Answer | Problem | None:

@@ -12,17 +12,19 @@ from typing import Any, NoReturn, Protocol
 
 import structlog
 from shift_schemas.errors import ShiftError
+from shift_schemas.shards import Shard
 
 from shift_runtime.bus.zenoh import ZenohBus
 from shift_runtime.claim import OwnedElsewhere
 from shift_runtime.clock import SystemClock
 from shift_runtime.journal import Journal
+from shift_runtime.journal_schema import check_no_live_sessions
 from shift_runtime.logs import configure_logs
 from shift_runtime.metrics import Metrics
 from shift_runtime.service.core import Core
 from shift_runtime.service.extension import Extension
 from shift_runtime.service.loop import Worker
-from shift_runtime.settings import MeshSettings, read_settings
+from shift_runtime.settings import ServiceSettings, read_settings
 
 log = structlog.get_logger()
 OWNED_ELSEWHERE = 3
@@ -32,7 +34,7 @@ OWNED_ELSEWHERE = 3
 class Extend(Protocol):
     """Makes what a service adds to its worker."""
 
-    def __call__(self, worker: Worker[Any], /, settings: MeshSettings) -> Extension:
+    def __call__(self, worker: Worker[Any], /, settings: ServiceSettings) -> Extension:
         """Return the extension of this worker."""
 
 
@@ -43,8 +45,8 @@ def run_service(core: Core[Any], extend: Extend | None = None) -> None:
     :data:`OWNED_ELSEWHERE`; the reason is written to standard error.
     """
     try:
-        settings = read_settings()
-        configure_logs(core.name, settings)
+        settings = read_settings(ServiceSettings)
+        configure_logs(worker_name(core.name, settings.shard), settings)
         run_loop(serve(core, settings, extend))
     except OwnedElsewhere as e:
         sys.stderr.write(f"shift_{core.name}: {e.detail}\n")
@@ -53,6 +55,11 @@ def run_service(core: Core[Any], extend: Extend | None = None) -> None:
         sys.stderr.write(f"shift_{core.name}: {e.detail}\n")
         sys.exit(2)
     leave()
+
+
+def worker_name(service: str, shard: Shard) -> str:
+    """Return the name of a worker in logs and metrics: ``monitor``, or ``monitor 0/4`` with several shards."""
+    return f"{service} {shard}" if shard.count > 1 else service
 
 
 def run_loop(main: Coroutine[Any, Any, None]) -> None:
@@ -72,12 +79,15 @@ def leave() -> NoReturn:
     os._exit(0)
 
 
-async def serve(core: Core[Any], settings: MeshSettings, extend: Extend | None = None) -> None:
+async def serve(core: Core[Any], settings: ServiceSettings, extend: Extend | None = None) -> None:
     """Run the service on its bus until a signal."""
-    journal = Journal(settings.data / "state" / f"{core.name}.sqlite", core.name, core.lookups)
-    bus = await ZenohBus.open(settings.zenoh, settings.listen)
+    shard = settings.shard
+    state = settings.data / "state"
+    check_no_live_sessions(state, core.name, shard)
+    journal = Journal(state / shard.name / f"{core.name}.sqlite", core.name, core.lookups, settings.data)
+    bus = await ZenohBus.open(settings.zenoh, settings.listen, shard.name)
     extended = partial(extend, settings=settings) if extend is not None else None
-    worker = Worker(core, bus, journal, SystemClock(), Metrics(core.name), extended)
+    worker = Worker(core, bus, journal, SystemClock(), Metrics(worker_name(core.name, shard)), extended)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, worker.stop)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from shift_schemas.errors import Unavailable, UnknownThing
@@ -30,7 +30,8 @@ from shift_study.study import Study
 
 from shift_runtime.bus.protocol import Bus
 from shift_runtime.deadline import Deadline
-from shift_runtime.reader import Reader, ReadFact
+from shift_runtime.reader import ReadFact
+from shift_runtime.sharded_reader import ShardedReader
 
 NOTIFICATION_WAIT_S = 0.05
 """How long a read waits for a notification before it pulls the owners' journals."""
@@ -80,13 +81,13 @@ class SessionView:
 
 
 class ReadModel:
-    """All sessions."""
+    """All sessions. ``buses`` has the bus of each shard."""
 
     def __init__(
-        self, bus: Bus, dropped: Callable[[str], None], lost: Callable[[str], None] = lambda owner: None
+        self, buses: Sequence[Bus], dropped: Callable[[str], None], lost: Callable[[str], None] = lambda owner: None
     ) -> None:
         self.views: dict[str, SessionView] = {}
-        self.reader = Reader(bus, tuple(OWNERS), {}, self._deliver, dropped, closed=True, lost=lost)
+        self.reader = ShardedReader(buses, tuple(OWNERS), self._deliver, dropped, lost)
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -142,7 +143,7 @@ class ReadModel:
     def has_read(self, session: str, owner: str) -> bool:
         """Return whether the read model has all facts of ``owner`` that clients were answered."""
         wanted = self.views[session].sequences.get(owner, 0)
-        return self.reader.cursors.get((session, owner), 0) >= wanted
+        return (self.reader.cursor(session, owner) or 0) >= wanted
 
     def _deliver(self, read: ReadFact) -> None:
         fact = read.fact
@@ -162,8 +163,7 @@ class ReadModel:
 
     def _defer(self, read: ReadFact) -> None:
         """Read the fact again after the recorder has published its session."""
-        self.reader.cursors[read.fact.session, read.owner] = read.seq - 1
-        self.reader.pull_soon("recorder")
+        self.reader.read_again(read)
 
 
 def _fold(view: SessionView, fact: Fact) -> None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationError
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 from shift_schemas.errors import InvalidSettings, field_errors
+from shift_schemas.shards import MOST_SHARDS, Shard, parse_shard
 from shift_schemas.suggestions import did_you_mean
 
 from shift_runtime.endpoints import parse_endpoint
 
 DEFAULT_ROUTER = "tcp/127.0.0.1:7447"
+K = TypeVar("K", bound="MeshSettings")
 LOG_LEVELS = ("debug", "info", "warning", "error")
 _OTHER_NAMES = {"warn": "warning", "fatal": "error", "critical": "error"}
 """The names of log levels in ROS 2 and in Python's logging."""
@@ -35,6 +37,10 @@ def _endpoint(text: str) -> str:
     return text
 
 
+def _shard(value: object) -> object:
+    return parse_shard(value) if isinstance(value, str) else value
+
+
 LogLevel = Annotated[Literal["debug", "info", "warning", "error"], BeforeValidator(_log_level)]
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 
@@ -54,7 +60,22 @@ class MeshSettings(BaseSettings):
     log_json: bool = Field(default=False, description="Logs as JSON lines.")
 
 
-def read_settings(kind: type[MeshSettings] = MeshSettings, **given: object) -> MeshSettings:
+class ServiceSettings(MeshSettings):
+    """The settings of monitor, decider, learner and recorder."""
+
+    shard: Annotated[Shard, NoDecode, BeforeValidator(_shard)] = Field(
+        default=Shard(),
+        description="The shard of this worker: its number, from 0, and the number of shards (0/4).",
+    )
+
+
+class ClientSettings(MeshSettings):
+    """The settings of the processes that use the services of every shard."""
+
+    shards: int = Field(default=1, ge=1, le=MOST_SHARDS, description="The number of shards of the mesh.")
+
+
+def read_settings(kind: type[K] = MeshSettings, **given: object) -> K:  # type: ignore[assignment]
     """Return the settings; ``given`` (flags) overrides the environment. Raise :class:`InvalidSettings`."""
     try:
         return kind(**{k: v for k, v in given.items() if v is not None})  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from shift_runtime.metrics import Metrics
 from shift_runtime.service.loop import Worker
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import Unavailable
-from shift_schemas.messages import Decide
+from shift_schemas.messages import Decide, Health
 from shift_schemas.timestamps import Stamp
 from support.runtime_fixtures import until_asked
 from support.worker_rig import CORE, Notes
@@ -52,6 +52,10 @@ class Hanging(threading.Thread):
         await bus.close()
 
 
+async def _health(client: MeshClient) -> Health | None:
+    return (await client.healths())["decider"]
+
+
 @pytest.mark.anyio
 async def test_hung_worker_answers_neither_health_nor_outbox_though_its_token_stays(
     router: str, tmp_path: Path
@@ -61,19 +65,19 @@ async def test_hung_worker_answers_neither_health_nor_outbox_though_its_token_st
     assert await asyncio.to_thread(hanging.up.wait, 30)
     bus = await ZenohBus.open(router, "tcp/127.0.0.1:0")
     watcher = await asyncio.to_thread(zenoh.open, zenoh_config("client", connect=router))
-    client = MeshClient(bus, patience_s=1.5)
+    client = MeshClient([bus], patience_s=1.5)
     try:
-        await until_asked(lambda: client.health("decider"))
+        await until_asked(lambda: _health(client))
         assert (await client.command(Decide(command_id="d1", session="s1", task="any"))).seq == 1
         with pytest.raises(Unavailable, match="the decider does not answer"):
             await client.command(Decide(command_id="d2", session="s1", task="hang"))
-        assert await client.health("decider") is None
+        assert (await client.healths())["decider"] is None
         alive = await asyncio.to_thread(
             lambda: list(watcher.liveliness().get("shift/v1/@service/decider/alive", timeout=1.0))
         )
         assert any(reply.ok for reply in alive)
         hanging.let_go.set()
-        await until_asked(lambda: client.health("decider"))
+        await until_asked(lambda: _health(client))
         repeat = await client.command(Decide(command_id="d2", session="s1", task="hang"))
         assert repeat.repeat
         assert repeat.seq == 2

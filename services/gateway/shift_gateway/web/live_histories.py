@@ -84,7 +84,7 @@ class LiveHistories:
     async def _load(self, session: str, view: SessionView, followed: _Followed) -> None:
         """Read what the read model has read already, and then apply what came meanwhile."""
         await self._read_model_has_ended_session(session, view)
-        cursors = {owner: self._gateway.read_model.reader.cursors.get((session, owner), 0) for owner in OWNERS}
+        cursors = {owner: self._gateway.read_model.reader.cursor(session, owner) or 0 for owner in OWNERS}
         view.listeners.append(followed.on_fact)
         for owner, cursor in cursors.items():
             await self._read(session, owner, cursor, followed.history)
@@ -95,7 +95,7 @@ class LiveHistories:
     async def _read_model_has_ended_session(self, session: str, view: SessionView) -> None:
         """Have the read model read a session that ended before this gateway started: it does so only when asked."""
         reader = self._gateway.read_model.reader
-        unread = [owner for owner in OWNERS if (session, owner) not in reader.cursors]
+        unread = [owner for owner in OWNERS if reader.cursor(session, owner) is None]
         if has_ended(view.fact.state) and unread and (silent := await reader.pull_all(unread, session)):
             raise Unavailable(f"the {silent[0]} does not answer")
 
@@ -103,7 +103,7 @@ class LiveHistories:
         first = max(0, last - TAIL.get(owner, last))
         while first < last:
             query = OutboxQuery(cursors={session: first}, only=[session], closed=True)
-            page = await outbox_page(self._gateway.mesh.bus, owner, query)
+            page = await outbox_page(self._gateway.mesh.bus_of(session), owner, query)
             for row in page.rows:
                 if first < row.seq <= last:
                     history.apply(fact_of(row))

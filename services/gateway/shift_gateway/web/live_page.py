@@ -47,7 +47,7 @@ async def live_session_page(
 
     def update() -> None:
         script = elements.update()
-        if not gateway.read_model.reader.links.unreached:
+        if not gateway.read_model.reader.unreached:
             script = f"shift.heard({gateway.api.clock.now().ns // 1_000_000}); {script}"
         ui.run_javascript(script)
 

@@ -8,7 +8,7 @@ import time
 
 from shift_schemas.errors import Unavailable
 from shift_schemas.lifecycle import has_ended
-from shift_schemas.messages import Health, OutboxQuery
+from shift_schemas.messages import OutboxQuery
 from shift_schemas.registry import OWNERS
 
 from shift_gateway.gateway import Gateway
@@ -36,9 +36,8 @@ class Preflight:
         return await asyncio.shield(self._asking)
 
     async def _ask(self) -> list[Check]:
-        answers = await asyncio.gather(*(self._gateway.mesh.health(owner) for owner in OWNERS))
         now_ns = self._gateway.api.clock.now().ns
-        found: dict[str, Health | None] = dict(zip(OWNERS, answers, strict=True))
+        found = await self._gateway.mesh.healths()
         found["gateway"] = self._gateway.health()
         for name, health in found.items():
             if health is not None:
@@ -51,14 +50,15 @@ class Preflight:
         """Return how many messages of live sessions the recorder has not read yet; None if it does not answer."""
         read_model = self._gateway.read_model
         live = [name for name, view in read_model.views.items() if not has_ended(view.fact.state)]
-        heads = dict(read_model.reader.cursors)
-        query = OutboxQuery(cursors={name: heads.get((name, "recorder"), 0) for name in live}, only=live, limit=1)
+        heads = {(name, owner): read_model.reader.cursor(name, owner) or 0 for name in live for owner in OWNERS}
+        query = OutboxQuery(cursors={name: heads[name, "recorder"] for name in live}, only=live, limit=1)
         try:
-            page = await outbox_page(self._gateway.mesh.bus, "recorder", query)
+            pages = await asyncio.gather(*(outbox_page(bus, "recorder", query) for bus in self._gateway.mesh.buses))
         except Unavailable:
             return None
+        read = {name: cursors for page in pages for name, cursors in page.cursors.items()}
         return sum(
-            max(n - page.cursors[name].get(owner, 0), 0)
+            max(n - read[name].get(owner, 0), 0)
             for (name, owner), n in heads.items()
-            if owner != "recorder" and name in page.cursors
+            if owner != "recorder" and name in read
         )

@@ -13,7 +13,7 @@ from __future__ import annotations
 from shift_runtime.service.core import Core
 from shift_runtime.service.extension import Extension
 from shift_runtime.service.loop import Worker
-from shift_runtime.settings import MeshSettings
+from shift_runtime.settings import ServiceSettings
 from shift_schemas.registry import READS
 
 from shift_recorder import core
@@ -33,7 +33,7 @@ CORE: Core[RecorderState] = Core(
 )
 
 
-def extend(worker: Worker[RecorderState], settings: MeshSettings) -> Extension:
+def extend(worker: Worker[RecorderState], settings: ServiceSettings) -> Extension:
     """Return what the recorder adds to its worker; its files lie in the settings' data folder."""
     data = settings.data
     sink = SegmentSink(
@@ -59,4 +59,4 @@ def extend(worker: Worker[RecorderState], settings: MeshSettings) -> Extension:
         for session in sink.sessions:
             await ends.pause(session)
 
-    return Extension(sink, ends, SessionCommands(data).prepare, start, stop)
+    return Extension(sink, ends, SessionCommands(data, settings.shard).prepare, start, stop)

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from shift_runtime.study_files import study_to_start
-from shift_schemas.errors import Unavailable
+from shift_schemas.errors import MalformedMessage, Unavailable
 from shift_schemas.messages import Message, StartSession
+from shift_schemas.shards import Shard, shard_of
 
 LEAST_FREE_BYTES = 64 * 2**20
 """The free space without which no session starts, bytes: an hour of gaze at 300 Hz and its journals. A choice."""
@@ -33,9 +34,12 @@ class SessionCommands:
     ----------
     data
         The data folder, with ``recordings``, ``segments`` and ``studies`` in it.
+    shard
+        The shard of this worker; sessions of other shards are refused.
     """
 
-    def __init__(self, data: Path) -> None:
+    def __init__(self, data: Path, shard: Shard = Shard()) -> None:  # noqa: B008 (it is frozen)
+        self._shard = shard
         self._recordings = data / "recordings"
         self._segments = data / "segments"
         self._studies = data / "studies"
@@ -49,13 +53,24 @@ class SessionCommands:
             There is no room for the recording, or its folder cannot be written.
         InvalidStudy
             The study does not exist or is not valid.
+        MalformedMessage
+            The session belongs to another shard.
         """
         if not isinstance(message, StartSession):
             return message
+        if not self._shard.holds(session):
+            belongs = Shard(shard_of(session, self._shard.count), self._shard.count)
+            raise MalformedMessage(
+                f"session {session} belongs to shard {belongs}, and this is shard {self._shard}: the client must send "
+                "each session to the shard to which its id hashes (shift_schemas.shards.shard_of)"
+            )
         self._check_room()
         study, warnings = study_to_start(message.study, self._studies)
         known, revision = software()
-        found = {"study": study, "software": known, "revision": revision, "warnings": list(warnings)}
+        shard = str(self._shard) if self._shard.count > 1 else ""
+        found = {
+            "study": study, "software": known, "revision": revision, "shard": shard, "warnings": list(warnings),
+        }  # fmt: skip
         return message.model_copy(update=found)
 
     def _check_room(self) -> None:

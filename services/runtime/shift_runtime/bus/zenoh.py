@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 import zenoh
 from shift_schemas.errors import InvalidSettings
+from shift_schemas.shards import every_shard
 from zenoh.handlers import Callback
 
 from shift_runtime.bus.protocol import Handle, Incoming, Reply, Request
@@ -192,18 +193,25 @@ class ZenohBus:
     """One Zenoh session. Create it with :meth:`open` in the loop in which its handlers run."""
 
     def __init__(
-        self, session: zenoh.Session, loop: asyncio.AbstractEventLoop, connect: str = "", listen: str = ""
+        self,
+        session: zenoh.Session,
+        loop: asyncio.AbstractEventLoop,
+        connect: str = "",
+        listen: str = "",
+        namespace: str = "",
     ) -> None:
         self.session = session
-        self._connect, self._listen = connect, listen
+        self._connect, self._listen, self._namespace = connect, listen, namespace
         self._moving = asyncio.Lock()
         self._loop = loop
         self._gate = _Gate(loop)
         self._handles: list[_Handle] = []
 
     @classmethod
-    async def open(cls, connect: str, listen: str = "") -> ZenohBus:
+    async def open(cls, connect: str, listen: str = "", namespace: str = "") -> ZenohBus:
         """Open a session. A router that does not run yet is tried again in the background.
+
+        Every key of the session is under ``namespace``, if one is given, as each shard of a mesh has one.
 
         Raises
         ------
@@ -211,11 +219,11 @@ class ZenohBus:
             An endpoint is not valid, or it cannot be listened on.
         """
         try:
-            session = await _opened(connect, listen)
+            session = await _opened(connect, listen, namespace)
         except zenoh.ZError as e:
             said = str(e).partition(" at /")[0]
             raise InvalidSettings(f"SHIFT_ZENOH is {connect!r}, SHIFT_LISTEN is {listen!r}: {said}") from e
-        return cls(session, asyncio.get_running_loop(), connect, listen)
+        return cls(session, asyncio.get_running_loop(), connect, listen, namespace)
 
     def put(self, key: str, payload: bytes, *, encoding: str = "", attachment: bytes = b"") -> None:
         """See :class:`~shift_runtime.bus.protocol.Bus`."""
@@ -272,7 +280,7 @@ class ZenohBus:
         """See :class:`~shift_runtime.bus.protocol.Bus`. The new session is open before the old one closes."""
         async with self._moving:
             try:
-                session = await _opened(self._connect, self._listen)
+                session = await _opened(self._connect, self._listen, self._namespace)
                 for handle in self._handles:
                     handle.move(session)
             except zenoh.ZError as e:
@@ -282,7 +290,7 @@ class ZenohBus:
 
     async def answers_by_router(self, key: str) -> bool:
         """See :class:`~shift_runtime.bus.protocol.Bus`. It asks as a client, which has no other link."""
-        return await asyncio.to_thread(_answers, self._connect, key)
+        return await asyncio.to_thread(_answers, self._connect, self._namespace, key)
 
     @property
     def joined(self) -> bool:
@@ -316,9 +324,15 @@ class ZenohBus:
         return handle
 
 
-async def _opened(connect: str, listen: str) -> zenoh.Session:
+async def open_buses(connect: str, listen: str, shards: int) -> list[ZenohBus]:
+    """Open the bus of each shard, in their order. Raise :class:`InvalidSettings` if an endpoint is not valid."""
+    return [await ZenohBus.open(connect, listen, shard.name) for shard in every_shard(shards)]
+
+
+async def _opened(connect: str, listen: str, namespace: str) -> zenoh.Session:
     mode = "peer" if listen else "client"
-    return await asyncio.to_thread(zenoh.open, zenoh_config(mode, connect=connect, listen=listen))
+    config = zenoh_config(mode, connect=connect, listen=listen, namespace=namespace)
+    return await asyncio.to_thread(zenoh.open, config)
 
 
 def _leave(session: zenoh.Session, then: Callable[[], None]) -> None:
@@ -332,9 +346,10 @@ def _leave(session: zenoh.Session, then: Callable[[], None]) -> None:
     threading.Thread(target=close, name="zenoh-close", daemon=True).start()
 
 
-def _answers(connect: str, key: str) -> bool:
+def _answers(connect: str, namespace: str, key: str) -> bool:
+    config = zenoh_config("client", connect=connect, timeout_ms=round(1000 * BY_ROUTER_S), namespace=namespace)
     try:
-        session = zenoh.open(zenoh_config("client", connect=connect, timeout_ms=round(1000 * BY_ROUTER_S)))
+        session = zenoh.open(config)
     except zenoh.ZError:
         return False
     try:

@@ -8,11 +8,13 @@ from typing import Any
 import zenoh
 
 
-def zenoh_config(mode: str, *, connect: str = "", listen: str = "", timeout_ms: int = -1) -> zenoh.Config:
+def zenoh_config(
+    mode: str, *, connect: str = "", listen: str = "", timeout_ms: int = -1, namespace: str = ""
+) -> zenoh.Config:
     """Return a configuration without multicast; ``mode`` is peer, client or router.
 
     ``timeout_ms`` is how long Zenoh tries to connect at the start. With -1 it tries without end; a peer does so in the
-    background.
+    background. Every key is under ``namespace``, if one is given.
     """
     config = zenoh.Config()
     entries: dict[str, Any] = {
@@ -27,6 +29,8 @@ def zenoh_config(mode: str, *, connect: str = "", listen: str = "", timeout_ms: 
         "open/return_conditions/connect_scouted": False,
         "open/return_conditions/declares": False,
     }
+    if namespace:
+        entries["namespace"] = namespace
     for key, value in entries.items():
         config.insert_json5(key, json.dumps(value))
     return config

@@ -63,7 +63,7 @@ class ServiceEndpoints:
         return Health(
             service=self.service, ready=self.ready and not any(reasons), detail=next(filter(None, reasons), ""),
             sessions=len(self.states), unreached=unreached, mesh=self.claim.mesh, since=self.claim.since,
-            data=str(self.journal.path.parent.parent.absolute()),
+            data=str(self.journal.data.absolute()),
         )  # fmt: skip
 
     def _on_outbox(self, request: Request) -> None:
