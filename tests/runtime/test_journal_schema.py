@@ -93,7 +93,7 @@ def test_migrated_journal_has_the_schema_of_a_new_one(tmp_path: Path, path: Path
             tables = [name for (name,) in db.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY 1")]
             schemas.append({name: db.execute(f"PRAGMA table_info({name})").fetchall() for name in tables})
     assert schemas[0] == schemas[1]
-    assert set(schemas[0]) == {"outbox", "cursor", "state", "answer", "place"}
+    assert set(schemas[0]) == {"outbox", "cursor", "state", "answer", "place", "part"}
 
 
 @pytest.mark.parametrize("done", range(VERSION + 1))

@@ -11,6 +11,8 @@ from shift_runtime.sharded_reader import ShardedReader
 from shift_schemas.shards import shard_of
 from support.outbox_owner import Owner
 
+pytestmark = pytest.mark.anyio
+
 SESSIONS = ("s1", "s2", "s3", "s4", "s5")
 Rig = tuple[ShardedReader, list[Owner], list[ReadFact]]
 
@@ -29,7 +31,7 @@ async def rig() -> AsyncIterator[Rig]:
         await bus.close()
 
 
-def test_sessions_of_these_tests_are_in_both_shards() -> None:
+async def test_sessions_of_these_tests_are_in_both_shards() -> None:
     assert {shard_of(session, 2) for session in SESSIONS} == {0, 1}
 
 

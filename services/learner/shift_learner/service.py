@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from shift_runtime.service.core import Core
+from shift_runtime.service.core import Core, Parts
 from shift_schemas.registry import READS
 
 from shift_learner import core
 from shift_learner.core import LearnerState
+from shift_learner.state import dump_part, parts_of, restore_parts, without_parts
 
 CORE: Core[LearnerState] = Core(
     name="learner",
@@ -14,4 +15,5 @@ CORE: Core[LearnerState] = Core(
     dump=core.dump,
     load=core.load,
     reads=READS["learner"],
+    parts=Parts(parts_of, without_parts, dump_part, restore_parts),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -78,6 +79,7 @@ class LearnerState:
 
 
 _STATE = TypeAdapter(LearnerState)
+_REPORTED = TypeAdapter(Reported)
 
 
 def dump(state: LearnerState) -> str:
@@ -92,6 +94,30 @@ def load(text: str) -> LearnerState:
     if state.config is None:
         return state
     return replace(state, memory=state.learner.load(state.context, state.memory))
+
+
+# --- the parts that are kept apart ---
+
+
+def parts_of(state: LearnerState) -> dict[str, Reported]:
+    """Return the reported decisions by their ids: a commit changes one of them at most."""
+    return state.reported
+
+
+def without_parts(state: LearnerState) -> LearnerState:
+    """Return the state without the reported decisions."""
+    return replace(state, reported={})
+
+
+def dump_part(part: Reported) -> str:
+    """Return a reported decision as JSON."""
+    return _REPORTED.dump_json(part).decode()
+
+
+def restore_parts(state: LearnerState, parts: Mapping[str, str]) -> LearnerState:
+    """Return the state with the reported decisions, in the order of their reports."""
+    reported = {name: _REPORTED.validate_json(text) for name, text in parts.items()}
+    return replace(state, reported=dict(sorted(reported.items(), key=lambda item: item[1].performance.n)))
 
 
 @lru_cache(maxsize=64)

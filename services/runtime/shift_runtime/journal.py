@@ -49,6 +49,8 @@ class Batch:
     rows: list[OutboxRow] = field(default_factory=list)
     answers: dict[AnswerKey, StoredAnswer] = field(default_factory=dict)
     closed: set[str] = field(default_factory=set)
+    parts: dict[tuple[str, str], str | None] = field(default_factory=dict)
+    """By session and name, the parts of states that changed; None for a part that is gone."""
 
     def __bool__(self) -> bool:
         return bool(self.states or self.cursors or self.rows or self.answers or self.closed)
@@ -182,6 +184,10 @@ class Journal:
         row = self._db.execute("SELECT data FROM state WHERE session = ?", (session,)).fetchone()
         return row[0] if row and row[0] is not None else None
 
+    def parts(self, session: str) -> dict[str, str]:
+        """Return the parts of a session's state that are kept apart, by name."""
+        return dict(self._db.execute("SELECT name, data FROM part WHERE session = ?", (session,)))
+
     def sessions(self) -> Iterator[tuple[str, bool]]:
         """Yield every session that has a state, and whether it is closed."""
         yield from ((s, bool(c)) for s, c in self._db.execute("SELECT session, closed FROM state").fetchall())
@@ -271,6 +277,12 @@ class Journal:
         rows: dict[str, list[tuple[str | int, ...]]] = {
             "INSERT INTO state (session, data) VALUES (?, ?) ON CONFLICT DO UPDATE SET data = excluded.data": [
                 *batch.states.items()
+            ],
+            "DELETE FROM part WHERE session = ? AND name = ?": [
+                key for key, text in batch.parts.items() if text is None
+            ],
+            "INSERT OR REPLACE INTO part VALUES (?, ?, ?)": [
+                (*key, text) for key, text in batch.parts.items() if text is not None
             ],
             "INSERT OR REPLACE INTO cursor VALUES (?, ?, ?)": [(*key, n) for key, n in batch.cursors.items()],
             "INSERT INTO outbox VALUES (?, ?, ?, ?)": [(r.session, r.seq, r.subject, r.payload) for r in batch.rows],

@@ -56,7 +56,12 @@ def _create_place(db: sqlite3.Connection) -> None:
     db.execute("CREATE TABLE IF NOT EXISTS place (one INTEGER PRIMARY KEY, file TEXT)")
 
 
-MIGRATIONS: tuple[Migration, ...] = (_create_tables, _rename_digest, _create_place)
+def _create_part(db: sqlite3.Connection) -> None:
+    """Create the table of the parts of states that most commits do not change."""
+    db.execute("CREATE TABLE part (session TEXT, name TEXT, data TEXT, PRIMARY KEY (session, name)) WITHOUT ROWID")
+
+
+MIGRATIONS: tuple[Migration, ...] = (_create_tables, _rename_digest, _create_place, _create_part)
 """The n-th migration, from 1, brings a journal from version n - 1 to n. A new file has version 0, as those of 0.1 and
 0.2 have."""
 

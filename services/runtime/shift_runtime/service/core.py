@@ -28,6 +28,23 @@ class CoreStep(Protocol[S]):
 
 
 @dataclass(frozen=True)
+class Parts(Generic[S]):
+    """Parts of a state that have rows of their own in the journal, because most commits do not change them.
+
+    A part is written where it is another object than at the last commit, so a core never changes one in place.
+    """
+
+    of: Callable[[S], Mapping[str, Any]]
+    """Returns the parts by name."""
+    without: Callable[[S], S]
+    """Returns the state without its parts."""
+    dump: Callable[[Any], str]
+    """Returns a part as text."""
+    restore: Callable[[S, Mapping[str, str]], S]
+    """Returns the state with its parts, which are given as texts by name."""
+
+
+@dataclass(frozen=True)
 class Core(Generic[S]):
     """A core and its inputs: the owners that it reads, and the subjects of each that it steps on."""
 
@@ -40,5 +57,7 @@ class Core(Generic[S]):
     """Turns a request's message into what the core steps on, given the state and the facts recorded before."""
     held: Callable[[S], Any | None] = lambda state: None
     """Returns the event that makes the core publish what it holds back, or None if it holds nothing back."""
+    parts: Parts[S] | None = None
+    """The parts of the state that are kept apart, if there are any."""
     lookups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """By subject of its own, the fields by which ``recall`` finds facts."""

@@ -171,6 +171,8 @@ class Transactions(Generic[S]):
         self.open, self._forced = Transaction(), False
         for session in done.batch.states:
             done.batch.states[session] = self._states.dump(session)
+            for name, text in self._states.changed_parts(session).items():
+                done.batch.parts[session, name] = text
         try:
             with self._metrics.commit_seconds.time():
                 self._journal.commit(done.batch)
@@ -178,6 +180,8 @@ class Transactions(Generic[S]):
             self._undo(done, e)
             return None
         self._alarm.clear_alarm()
+        for session in done.batch.states:
+            self._states.committed(session)
         return done
 
     def force_commit(self) -> None:
