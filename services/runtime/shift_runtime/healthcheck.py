@@ -15,7 +15,7 @@ import sys
 from urllib.parse import urlsplit
 
 TIMEOUT_S = 2.0
-CHECKED = ("router", "gateway", "recorder", "monitor", "decider", "learner", "simulator")
+CHECKED = ("router", "gateway", "recorder", "monitor", "decider", "learner", "simulator", "ros2_bridge")
 
 
 def main(arguments: list[str]) -> int:
@@ -63,7 +63,7 @@ def _service(name: str) -> bool:
 
     from shift_runtime.bus.zenoh_config import zenoh_config
 
-    shard = parse_shard(os.environ.get("SHIFT_SHARD", "0/1"))
+    shard = parse_shard(os.environ.get("SHIFT_SHARD", f"0/{os.environ.get('SHIFT_SHARDS', '1')}"))
     config = zenoh_config(
         "client", connect=os.environ.get("SHIFT_ZENOH", "tcp/127.0.0.1:7447"), timeout_ms=2000, namespace=shard.name
     )
