@@ -60,6 +60,8 @@ class MeshApi:
         fact = kind.result
         numbers = {fact.subject: answer.result[fact.number]} if fact is not None and fact.number else {}
         self._remember(session, answer, numbers)
+        if isinstance(command, Decide):
+            view.made.add(command.command_id)
         return kind.answer_in(answer.result), answer.repeat
 
     async def start(self, body: BaseModel) -> tuple[dict[str, Any], bool]:
@@ -109,7 +111,7 @@ class MeshApi:
         return view.study.decider.wait_s
 
     async def _check_decision(self, session: str, view: SessionView, decision_id: str) -> None:
-        if decision_id not in view.decisions:
+        if decision_id not in view.decisions and decision_id not in view.made:
             if not await self.read_model.reader.pull("decider"):
                 raise Unavailable(
                     f"the decider does not answer, so it is not known whether decision {decision_id} exists"

@@ -48,6 +48,8 @@ class SessionView:
     policy: Policy | None = None
     decisions: dict[str, str] = field(default_factory=dict)
     """Each decision id with its task."""
+    made: set[str] = field(default_factory=set)
+    """The ids of decisions that clients were answered, read or not."""
     performances: int = 0
     overrides: dict[str, Override] = field(default_factory=dict)
     held: bool = False
