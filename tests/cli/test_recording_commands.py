@@ -1,4 +1,4 @@
-"""``verify`` and ``info`` on the command line: the last line says whether it is verified, and counts say of what."""
+"""``verify``, ``info`` and ``export`` on the command line: what they print, and their exit codes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from shift_cli.main import app
+from shift_schemas.errors import InvalidSettings
 from typer.testing import CliRunner
 
 KEPT = Path(__file__).parents[1] / "data" / "v0.1"
@@ -47,3 +48,38 @@ def test_info_counts_the_samples_beside_the_chunks_and_takes_the_sessions_own_ti
     assert found["duration_s"] > 0
     said = CliRunner().invoke(app, ["info", str(KEPT / "points.mcap")]).stdout
     assert "12 chunks, 360 samples" in said
+
+
+# --- export ---
+
+
+def test_export_writes_the_tables_of_every_recording_of_a_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    for name in ("points.mcap", "names-coffee.mcap"):
+        shutil.copy(KEPT / name, folder)
+    done = CliRunner().invoke(app, ["export", str(folder), "--to", "csv", "--out", str(tmp_path / "out"), "--json"])
+    found = json.loads(done.stdout)
+    assert done.exit_code == 0
+    assert sorted(found["recordings"]) == ["names-coffee.mcap", "points.mcap"]
+    assert found["rows"]["gaze"] >= 360
+    assert all(Path(path).is_file() for path in found["files"])
+
+
+def test_export_of_a_damaged_recording_says_so_and_ends_with_1(tmp_path: Path) -> None:
+    changed = tmp_path / "points.mcap"
+    data = bytearray((KEPT / "points.mcap").read_bytes())
+    data[len(data) // 2] ^= 0x10
+    changed.write_bytes(bytes(data))
+    done = CliRunner().invoke(app, ["export", str(changed), "--to", "vw", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1
+    assert "points.mcap is damaged" in done.stderr
+
+
+@pytest.mark.parametrize("screen", ["", "1920", "0x1080", "wide"])
+def test_export_to_bids_needs_a_screen(tmp_path: Path, screen: str) -> None:
+    line = ["export", str(KEPT / "points.mcap"), "--to", "bids", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, [*line, *(["--screen", screen] if screen else [])])
+    assert done.exit_code != 0
+    assert isinstance(done.exception, InvalidSettings)
+    assert "1920x1080" in done.exception.detail

@@ -15,6 +15,7 @@ from shift_simulator import commands as evaluate_commands
 
 from shift_cli import (
     doctor_command,
+    export_command,
     gaze_command,
     info_command,
     replay_command,
@@ -111,6 +112,7 @@ app.command("doctor")(doctor_command.doctor)
 app.command("simulate")(simulate_command.simulate)
 app.command("verify")(verify_command.verify)
 app.command("info")(info_command.info)
+app.command("export")(export_command.export)
 app.command("replay")(replay_command.replay)
 app.command("ros2", context_settings=ros2_command.CONTEXT)(ros2_command.ros2)
 app.add_typer(gaze_command.app, name="gaze")

@@ -1,0 +1,81 @@
+"""``shift-mesh export``: tables from recordings."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from shift_recording.export.bids import Screen
+    from shift_recording.export.export import Exported
+
+
+def export(
+    files: Annotated[list[Path], typer.Argument(help="Recordings, and folders of recordings.", envvar="SHIFT_FILES")],
+    to: Annotated[
+        Literal["csv", "parquet", "bids", "vw"],
+        typer.Option(help="csv, parquet, bids (eye tracking), or vw (Vowpal Wabbit).", envvar="SHIFT_TO"),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the files; it is made.", envvar="SHIFT_OUT")] = Path("export"),
+    covariates: Annotated[
+        Path | None,
+        typer.Option(help="CSV with a column participant; its other columns are added.", envvar="SHIFT_COVARIATES"),
+    ] = None,
+    screen: Annotated[
+        str, typer.Option(help="Size of the screen in pixels, for bids: 1920x1080.", envvar="SHIFT_SCREEN")
+    ] = "",
+    with_excluded: Annotated[
+        bool,
+        typer.Option("--with-excluded", help="Also recordings excluded from analysis.", envvar="SHIFT_WITH_EXCLUDED"),
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
+) -> None:
+    """Write the tables of recordings: sessions, gaze, decisions and more, all recordings together.
+
+    Exit code 0: everything was exported; 1: a recording is damaged, and the others were exported.
+
+    \b
+    shift-mesh export data/recordings --to csv --out tables
+    shift-mesh export s1.mcap s2.mcap --to parquet --covariates people.csv
+    shift-mesh export data/recordings --to bids --screen 1920x1080 --out bids
+    """
+    import json
+
+    from rich.console import Console
+    from rich.progress import Progress
+    from shift_recording.export.export import export as export_recordings
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("exporting", total=None)
+        done = export_recordings(
+            files, to, out, covariates=covariates, screen=_screen(screen), with_excluded=with_excluded,
+            on_progress=lambda read, total: bar.update(task, completed=read, total=total),
+        )  # fmt: skip
+    typer.echo(json.dumps(done.as_json(), ensure_ascii=False)) if as_json else _show(done, out)
+    for name, reason in done.report.excluded.items():
+        typer.echo(f"{name} is excluded from analysis ({reason}) and left out; --with-excluded exports it", err=True)
+    for name, reason in done.report.damaged.items():
+        typer.echo(f"{name} is damaged and was exported up to there: {reason}", err=True)
+    raise typer.Exit(1 if done.report.damaged else 0)
+
+
+def _screen(text: str) -> Screen | None:
+    from shift_recording.export.bids import Screen
+    from shift_schemas.errors import InvalidSettings
+
+    if not text:
+        return None
+    match = re.fullmatch(r"\s*(\d{1,5})\s*[xX×]\s*(\d{1,5})\s*", text)
+    if match is None or not int(match[1]) or not int(match[2]):
+        raise InvalidSettings(f"--screen is {text!r}: write width and height in pixels, such as 1920x1080")
+    return Screen(int(match[1]), int(match[2]))
+
+
+def _show(done: Exported, out: Path) -> None:
+    rows = ", ".join(f"{count} {table}" for table, count in done.rows.items() if count) or "nothing"
+    typer.echo(f"{len(done.report.read)} recordings: {rows}")
+    typer.echo(f"{len(done.files)} files in {out}/")

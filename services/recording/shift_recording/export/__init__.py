@@ -1,0 +1,1 @@
+"""Tables from recordings: CSV, Parquet, BIDS and Vowpal Wabbit."""

@@ -1,0 +1,182 @@
+"""The recordings of an export: found in folders, read one after the other, and reported if they are damaged."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing
+from shift_schemas.messages import Session
+
+from shift_recording.exclusion import read_exclusion
+from shift_recording.export.columns import Names
+from shift_recording.export.tables import RecordingRows, Row, names_in
+from shift_recording.mcap.reader import Recording
+
+OnProgress = Callable[[int, int], None]
+"""Called with the number of bytes that were read, and their total."""
+
+
+@dataclass
+class Report:
+    """What an export read and left out."""
+
+    read: list[str] = field(default_factory=list)
+    excluded: dict[str, str] = field(default_factory=dict)
+    """Recordings that are excluded from analysis, and why."""
+    damaged: dict[str, str] = field(default_factory=dict)
+    """Recordings that could not be read, or not completely, and why."""
+
+    def raise_damage(self) -> None:
+        """Raise :class:`DamagedRecording` for the first damaged recording."""
+        for name, why in self.damaged.items():
+            raise DamagedRecording(f"{name}: {why}")
+
+
+class OneRecording:
+    """The rows of one recording. Iterate over it once."""
+
+    def __init__(self, path: Path, report: Report, covariates: Mapping[str, Mapping[str, str]]) -> None:
+        self.rows = RecordingRows(path.name)
+        self._path, self._report, self._covariates = path, report, covariates
+
+    def __iter__(self) -> Iterator[tuple[str, Row]]:
+        """Yield the rows, each with its table. A damaged file is reported and gives the rows before the damage."""
+        name, recording = self._path.name, Recording(self._path)
+        try:
+            self.rows.session = first_session(self._path)
+            for recorded in recording.facts():
+                yield from self.rows.rows(recorded)
+        except (DamagedRecording, MalformedMessage) as e:
+            self._report.damaged[name] = e.detail
+        whole = recording.report.complete and name not in self._report.damaged
+        reason = "" if whole else self._report.damaged.get(name, recording.report.reason)
+        given = self._covariates.get(str(self.rows.keys()["participant"]), {})
+        yield from self.rows.rest(whole, reason, given)
+
+
+@dataclass(frozen=True)
+class Sources:
+    """The recordings to export, the names in them, and the covariates of their participants."""
+
+    files: tuple[Path, ...]
+    names: Names
+    covariates: Mapping[str, Mapping[str, str]]
+    report: Report
+
+    @property
+    def covariate_names(self) -> tuple[str, ...]:
+        """The names of the covariates, in the order of their file."""
+        return tuple(dict.fromkeys(name for given in self.covariates.values() for name in given))
+
+    def recordings(self, on_progress: OnProgress | None = None) -> Iterator[OneRecording]:
+        """Yield the recordings one after the other."""
+        total = sum(path.stat().st_size for path in self.files)
+        done = 0
+        for path in self.files:
+            yield OneRecording(path, self.report, self.covariates)
+            done += path.stat().st_size
+            if on_progress is not None:
+                on_progress(done, total)
+
+    def rows(self, on_progress: OnProgress | None = None) -> Iterator[tuple[str, Row]]:
+        """Yield the rows of all recordings, each with its table."""
+        for recording in self.recordings(on_progress):
+            yield from recording
+
+
+def first_session(path: Path) -> Session | None:
+    """Return the session of a recording as it began; other messages can stand before it in the file."""
+    for recorded in Recording(path).facts(("session",)):
+        assert isinstance(recorded.fact, Session)
+        return recorded.fact
+    return None
+
+
+def recordings_in(paths: Iterable[Path]) -> tuple[Path, ...]:
+    """Return the recordings: files as given, and all ``*.mcap`` in folders, each once.
+
+    Raises
+    ------
+    UnknownThing
+        A path does not exist, or a folder has no recording.
+    """
+    found: dict[Path, None] = {}
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(path.glob("*.mcap"))
+            if not inside:
+                raise UnknownThing(f"the folder {path} has no recording (*.mcap)")
+            found |= dict.fromkeys(inside)
+        elif path.is_file():
+            found[path] = None
+        else:
+            raise UnknownThing(f"there is no file {path}")
+    return tuple(found)
+
+
+def read_covariates(path: Path | None) -> dict[str, dict[str, str]]:
+    """Return the covariates by participant. The file is a CSV with a column ``participant``.
+
+    Raises
+    ------
+    UnknownThing
+        The file cannot be read.
+    MalformedMessage
+        It has no column ``participant``, or names a participant twice.
+    """
+    if path is None:
+        return {}
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError) as e:
+        raise UnknownThing(f"the covariates {path} cannot be read as UTF-8: {e}") from e
+    found: dict[str, dict[str, str]] = {}
+    for line, row in enumerate(rows, 2):
+        participant = row.pop("participant", None)
+        if participant is None:
+            raise MalformedMessage(f"{path}: the first line must name the columns, and one of them is participant")
+        if participant in found:
+            raise MalformedMessage(f"{path}, line {line}: participant {participant!r} is there twice")
+        found[participant] = {name: value for name, value in row.items() if name is not None}
+    return found
+
+
+def _check_session(path: Path, known: dict[str, str]) -> None:
+    session = first_session(path)
+    if session is not None and (other := known.setdefault(session.session, str(path))) != str(path):
+        raise MalformedMessage(
+            f"{other} and {path} are both recordings of session {session.session}, so their rows could not be told "
+            "apart; export them into different folders"
+        )
+
+
+def open_sources(paths: Iterable[Path], covariates: Path | None, with_excluded: bool) -> Sources:
+    """Find the recordings and read the names in them.
+
+    Raises
+    ------
+    UnknownThing, MalformedMessage
+        As :func:`recordings_in` and :func:`read_covariates`, or two recordings are of the same session.
+    """
+    report, names, files = Report(), Names(), list[Path]()
+    session_files: dict[str, str] = {}
+    for path in recordings_in(paths):
+        excluded: Any = None
+        try:
+            excluded = read_exclusion(path).in_force
+            if excluded is None or with_excluded:
+                _check_session(path, session_files)
+                names_in((recorded.fact for recorded in Recording(path).facts(("config", "decision"))), names)
+        except DamagedRecording as e:
+            report.damaged[path.name] = e.detail
+        if excluded is not None and not with_excluded:
+            report.excluded[path.name] = excluded.reason
+            continue
+        files.append(path)
+        report.read.append(path.name)
+    return Sources(tuple(files), names, read_covariates(covariates), report)
