@@ -83,3 +83,24 @@ def test_export_to_bids_needs_a_screen(tmp_path: Path, screen: str) -> None:
     assert done.exit_code != 0
     assert isinstance(done.exception, InvalidSettings)
     assert "1920x1080" in done.exception.detail
+
+
+# --- several recordings ---
+
+
+def test_folder_is_verified_and_described_in_a_report(tmp_path: Path) -> None:
+    report = tmp_path / "report.md"
+    line = ["verify", str(KEPT), "--report", str(report), "--workers", "2", "--json"]
+    found = json.loads(CliRunner().invoke(app, line).stdout)
+    assert (found["recordings"], found["ok"], found["complete"]) == (10, 10, 10)
+    assert {each["file"] for each in found["reports"]} == {path.name for path in KEPT.glob("*.mcap")}
+    assert report.read_text().startswith("# Verification of 10 recordings")
+
+
+def test_one_damaged_recording_makes_the_exit_code_1(tmp_path: Path) -> None:
+    for name in ("points.mcap", "late.mcap"):
+        shutil.copy(KEPT / name, tmp_path)
+    (tmp_path / "late.mcap").write_bytes(b"nothing")
+    done = CliRunner().invoke(app, ["verify", str(tmp_path), "--workers", "1"])
+    assert done.exit_code == 1
+    assert "1 of 2 recordings have no difference" in done.stdout

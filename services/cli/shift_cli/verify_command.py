@@ -2,41 +2,91 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    from shift_verify.many import RecordingReport
     from shift_verify.verify import VerifyReport
 
 
 def verify(
-    file: Annotated[Path, typer.Argument(help="The recording.", exists=True, dir_okay=False, envvar="SHIFT_FILE")],
+    files: Annotated[list[Path], typer.Argument(help="Recordings, and folders of recordings.", envvar="SHIFT_FILES")],
+    report: Annotated[
+        Path | None, typer.Option(help="Also write a readable report, in Markdown.", envvar="SHIFT_REPORT")
+    ] = None,
+    workers: Annotated[
+        int, typer.Option(help="Recordings at the same time; 0: one for each core.", min=0, envvar="SHIFT_WORKERS")
+    ] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
 ) -> None:
     """Derive every output of a recording again from its inputs, and report the first difference.
 
-    Exit code 0: there is none; 1: there is one, or the file is damaged.
+    Exit code 0: there is none; 1: there is one, or a file is damaged. With several recordings, --json prints
+    {"recordings", "ok", "complete", "reports"}.
 
     \b
     shift-mesh verify data/recordings/s1.mcap
     shift-mesh verify s1.mcap --json | jq .difference
+    shift-mesh verify data/recordings --report verification.md
     """
     import json
 
+    from shift_recording.files import recordings_in
+
+    paths = recordings_in(files)
+    reports = _reports(paths, workers or os.cpu_count() or 1)
+    if report is not None:
+        _write(report, reports)
+    verified = [each.verified for each in reports]
+    if as_json:
+        single = len(paths) == 1 and not files[0].is_dir()
+        typer.echo(json.dumps(reports[0].as_json() if single else _all_as_json(reports), ensure_ascii=False))
+    else:
+        for each in verified:
+            _show(each)
+        if len(verified) > 1:
+            typer.echo(f"{sum(v.ok for v in verified)} of {len(verified)} recordings have no difference")
+    raise typer.Exit(0 if all(v.ok for v in verified) else 1)
+
+
+def _reports(paths: tuple[Path, ...], workers: int) -> list[RecordingReport]:
     from rich.console import Console
     from rich.progress import Progress
-    from shift_verify.verify import verify as verify_recording
+    from shift_verify.many import report_on, report_on_many
 
-    with Progress(console=Console(stderr=True), transient=True, disable=not Console(stderr=True).is_terminal) as bar:
-        task = bar.add_task(f"verifying {file.name}", total=None)
-        report = verify_recording(file, lambda done, total: bar.update(task, completed=done, total=total))
-    if as_json:
-        typer.echo(json.dumps(report.as_json(), ensure_ascii=False))
-    else:
-        _show(report)
-    raise typer.Exit(0 if report.ok else 1)
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        if len(paths) == 1:
+            task = bar.add_task(f"verifying {paths[0].name}", total=None)
+            return [report_on(paths[0], lambda done, total: bar.update(task, completed=done, total=total))]
+        task = bar.add_task(f"verifying {len(paths)} recordings", total=len(paths))
+        found = []
+        for each in report_on_many(paths, workers):
+            found.append(each)
+            bar.advance(task)
+        return found
+
+
+def _all_as_json(reports: list[RecordingReport]) -> dict[str, object]:
+    verified = [each.verified for each in reports]
+    return {
+        "recordings": len(reports), "ok": sum(v.ok for v in verified), "complete": sum(v.complete for v in verified),
+        "reports": [each.as_json() for each in reports],
+    }  # fmt: skip
+
+
+def _write(path: Path, reports: list[RecordingReport]) -> None:
+    from importlib.metadata import version
+
+    from shift_recording.durable_file import write_durably
+    from shift_verify.supplement import supplement
+
+    write_durably(path, supplement(reports, version("shift-mesh")).encode())
+    typer.echo(f"report in {path}", err=True)
 
 
 def _show(report: VerifyReport) -> None:

@@ -14,6 +14,7 @@ from shift_schemas.messages import Session
 from shift_recording.exclusion import read_exclusion
 from shift_recording.export.columns import Names
 from shift_recording.export.tables import RecordingRows, Row, names_in
+from shift_recording.files import recordings_in
 from shift_recording.mcap.reader import Recording
 
 OnProgress = Callable[[int, int], None]
@@ -96,28 +97,6 @@ def first_session(path: Path) -> Session | None:
     return None
 
 
-def recordings_in(paths: Iterable[Path]) -> tuple[Path, ...]:
-    """Return the recordings: files as given, and all ``*.mcap`` in folders, each once.
-
-    Raises
-    ------
-    UnknownThing
-        A path does not exist, or a folder has no recording.
-    """
-    found: dict[Path, None] = {}
-    for path in paths:
-        if path.is_dir():
-            inside = sorted(path.glob("*.mcap"))
-            if not inside:
-                raise UnknownThing(f"the folder {path} has no recording (*.mcap)")
-            found |= dict.fromkeys(inside)
-        elif path.is_file():
-            found[path] = None
-        else:
-            raise UnknownThing(f"there is no file {path}")
-    return tuple(found)
-
-
 def read_covariates(path: Path | None) -> dict[str, dict[str, str]]:
     """Return the covariates by participant. The file is a CSV with a column ``participant``.
 
@@ -161,7 +140,8 @@ def open_sources(paths: Iterable[Path], covariates: Path | None, with_excluded: 
     Raises
     ------
     UnknownThing, MalformedMessage
-        As :func:`recordings_in` and :func:`read_covariates`, or two recordings are of the same session.
+        As :func:`~shift_recording.files.recordings_in` and :func:`read_covariates`, or two recordings are of the same
+        session.
     """
     report, names, files = Report(), Names(), list[Path]()
     session_files: dict[str, str] = {}

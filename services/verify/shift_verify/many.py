@@ -1,0 +1,73 @@
+"""Verify many recordings at once, each in a process of a pool, with the quality of their gaze."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shift_recording.checksum import sha256_of
+from shift_recording.gaze_quality import GazeQuality, SourceQuality
+from shift_recording.mcap.reader import Recording
+from shift_schemas.errors import ShiftError
+from shift_schemas.messages import Gaze, Session
+
+from shift_verify.verify import VerifyReport, verify
+
+
+@dataclass(frozen=True)
+class RecordingReport:
+    """What verify found in one recording, whose it is, and how good its gaze is."""
+
+    verified: VerifyReport
+    sha256: str
+    session: str = ""
+    participant: str = ""
+    study: str = ""
+    condition: str = ""
+    format: int = 0
+    software: str = ""
+    gaze: tuple[SourceQuality, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the report as ``--json`` prints it."""
+        return {
+            **self.verified.as_json(), "sha256": self.sha256, "session": self.session, "participant": self.participant,
+            "study": self.study, "condition": self.condition, "format": self.format, "software": self.software,
+            "gaze": [source.as_json() for source in self.gaze],
+        }  # fmt: skip
+
+
+def report_on(path: Path, on_progress: Callable[[int, int], None] | None = None) -> RecordingReport:
+    """Verify one recording, and describe it as far as it can be read. Raises :class:`UnknownThing`."""
+    verified, digest = verify(path, on_progress), sha256_of(path)
+    quality, session = GazeQuality(), None
+    try:
+        for recorded in Recording(path).facts(("session", "gaze")):
+            if isinstance(recorded.fact, Session):
+                session = session or recorded.fact
+            elif isinstance(recorded.fact, Gaze):
+                quality.add(recorded.fact)
+    except ShiftError:
+        pass  # the report has it
+    gaze = tuple(quality.sources())
+    if session is None:
+        return RecordingReport(verified, digest, gaze=gaze)
+    return RecordingReport(
+        verified, digest, session.session, session.participant, session.study, session.condition or "",
+        session.format, session.software, gaze,
+    )  # fmt: skip
+
+
+def report_on_many(paths: Iterable[Path], workers: int) -> Iterator[RecordingReport]:
+    """Yield the reports in the order of the paths, from so many processes at once."""
+    paths = tuple(paths)
+    if workers == 1 or len(paths) == 1:
+        yield from map(report_on, paths)
+        return
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(paths)), mp_context=spawn) as pool:
+        yield from pool.map(report_on, paths)
