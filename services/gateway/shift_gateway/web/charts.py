@@ -70,10 +70,16 @@ def strip_points(history: SessionHistory, after_ns: int, until_ns: int) -> list[
 
 
 def strip_marks(history: SessionHistory, now_ns: int) -> dict[str, Any]:
-    """Return what is drawn over the strip: decisions and markers as ``[ms, label]``, gaps as ``[first, last]``, ms."""
+    """Return what is drawn over the strip: decisions and markers as ``[ms, label]``, gaps as ``[first, last]``, ms.
+
+    A marker that was retracted is not drawn.
+    """
     first_ns = now_ns - int(WINDOW_S * 1e9)
     decisions = [[ns // 1_000_000, str(d.n)] for ns, d in history.decisions.between(first_ns, now_ns)]
-    markers = [[ns // 1_000_000, shortened(m.text)] for ns, m in history.markers.between(first_ns, now_ns)]
+    found = history.markers.between(first_ns, now_ns)
+    retracted = {marker.retracts for _, marker in history.markers.between(-1, now_ns) if marker.retracts}
+    kept = [(ns, marker) for ns, marker in found if not marker.retracts and marker.marker_id not in retracted]
+    markers = [[ns // 1_000_000, shortened(marker.text)] for ns, marker in kept]
     return {"decisions": decisions, "markers": markers, "gaps": gaps(history, first_ns, now_ns)}
 
 

@@ -51,7 +51,7 @@ def desk_numbers(history: SessionHistory, now_ns: int, at_ns: int = END_OF_TIME)
         capacity=f"{observation.capacity.value:.2f} {observation.capacity.category}" if observation else NOTHING,
         gaze=observation.gaze.category if observation else NOTHING,
         epsilon=epsilon,
-        cumulative_reward=f"{report.cumulative_reward:.2f}" if report else "0.00",
+        cumulative_reward=f"{report.cumulative_reward:z.2f}" if report else "0.00",
         learner=study.learner.name,
         paused=study.learner.paused,
     )
