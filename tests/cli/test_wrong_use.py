@@ -243,7 +243,7 @@ def test_another_server_is_not_taken_for_a_gateway(
 ) -> None:
     stranger.answer = (status, kind, text)  # type: ignore[attr-defined]
     said = wrong(capfd, "simulate", "--url", url_of(stranger))
-    assert f"what answers at {url_of(stranger)} is not a SHIFT gateway" in said
+    assert f"the server at {url_of(stranger)} is not a SHIFT gateway" in said
     assert says in said
 
 

@@ -101,7 +101,7 @@ def test_another_server_on_the_gateway_s_port_is_told_apart(mesh: LiveMesh, anot
     assert done.returncode == 1
     bad = [f for f in json.loads(done.stdout)["findings"] if not f["fine"]]
     assert [f["what"] for f in bad] == ["gateway"]
-    assert f"what answers at {another_server} is no" in bad[0]["detail"]
+    assert f"the server at {another_server} is no" in bad[0]["detail"]
 
 
 @pytest.mark.parametrize("endpoint", ["nonsense", "tcp/127.0.0.1:x", "tcp/"])

@@ -15,5 +15,5 @@ async def history_of(session: Session) -> SessionHistory:
     """Return the session's history so far, read by a second gateway."""
     mesh = session.mesh
     gateway = Gateway(GatewaySettings(data=mesh.data))
-    async with gateway.on(MemoryBus(mesh.hub), mesh.clock):
+    async with gateway.on([MemoryBus(mesh.hub)], mesh.clock):
         return await LiveHistories(gateway).open(session.name)

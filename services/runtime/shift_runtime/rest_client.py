@@ -192,7 +192,7 @@ class RestClient:
             return self._not_a_gateway(f"it answered {asked} with {status} and {_kind_of(response)}")
 
     def _not_a_gateway(self, why: str) -> ShiftError:
-        return ShiftError(f"what answers at {self.url} is not a SHIFT gateway: {why}. Is the URL the gateway's?")
+        return ShiftError(f"the server at {self.url} is not a SHIFT gateway: {why}. Is the URL the gateway's?")
 
 
 def _path(session: str, tail: str = "") -> str:

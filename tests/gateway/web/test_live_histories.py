@@ -24,7 +24,7 @@ pytestmark = pytest.mark.anyio
 async def following(mesh: Mesh) -> AsyncIterator[tuple[Gateway, LiveHistories]]:
     """Run a second gateway on the mesh, whose histories the test opens."""
     gateway = Gateway(GatewaySettings(data=mesh.data))
-    async with gateway.on(MemoryBus(mesh.hub), mesh.clock):
+    async with gateway.on([MemoryBus(mesh.hub)], mesh.clock):
         yield gateway, LiveHistories(gateway)
 
 
