@@ -6,6 +6,7 @@ BIN   := $(VENV)/bin
 PIP   := $(BIN)/python -m pip --quiet --disable-pip-version-check
 IMAGE ?= shift-mesh
 BASE  ?= python:3.11-slim-bookworm
+PYTEST_WORKERS ?= 2
 
 .DEFAULT_GOAL := help
 .PHONY: help setup setup-dev up test lint bench campaign-suspend image lock clean
@@ -19,7 +20,7 @@ setup-dev: $(VENV)/.project $(VENV)/.dev
 up: setup                               ## The whole mesh with a simulated person, at http://127.0.0.1:8080
 	@$(BIN)/shift-mesh up --demo $(ARGS)
 
-test: setup-dev                         ## All tests; PYTEST_ARGS="-k name" for some
+test: setup-dev                         ## All tests in two processes; PYTEST_ARGS="-k name" for some
 	@if version=$$(docker version --format '{{.Server.Version}}' 2>/dev/null); then \
 	    echo "Tests with containers: run, on Docker $$version."; \
 	elif [ "$$CI" = true ]; then \
@@ -27,7 +28,7 @@ test: setup-dev                         ## All tests; PYTEST_ARGS="-k name" for 
 	else \
 	    echo "Tests with containers: left out, since no engine answers."; \
 	fi
-	@$(BIN)/python -m pytest $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest --numprocesses $(PYTEST_WORKERS) --dist loadgroup $(PYTEST_ARGS)
 
 lint: setup-dev                         ## ruff, mypy, and who may import whom
 	@$(BIN)/ruff check .
