@@ -31,7 +31,7 @@ async def test_byte_order_mark_and_white_space_are_accepted(mesh: Mesh, mark: st
 
 @pytest.mark.parametrize(
     ("body", "says"),
-    [(b"", "it is empty; send an object"), (b" \n", "it is empty"), (gzip.compress(START.encode()), "gzip"),
+    [(b"", "it is empty; send an object"), (b" \n", "it is empty"), (gzip.compress(START.encode(), mtime=0), "gzip"),
      (START.encode("utf-16"), "UTF-16"), (START.encode("utf-16-le"), "UTF-16"), (START.encode("utf-16-be"), "UTF-16"),
      (START.encode("utf-32"), "UTF-32"), ('{"title": "Küche"}'.encode("latin-1"), "not in UTF-8 (byte 12 is 0xfc)"),
      (b"participant=P01&session=w", 'send a JSON object: {"participant": "P01", "session": "w"}'),

@@ -206,7 +206,7 @@ def test_session_that_is_not_an_id_is_refused_before_a_request(
         shift.end("P 01")
 
 
-@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), object()], ids=str)
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), object()], ids=["nan", "inf", "object"])
 def test_value_that_is_not_json_is_refused_before_a_request(gateway: Gateway, shift: RestClient, seconds: Any) -> None:
     with pytest.raises(MalformedMessage, match="cannot be sent as JSON"):
         shift.report("s1", "d1", True, seconds, True, 5.0)

@@ -156,7 +156,7 @@ FIELDS: list[tuple[str, int, list[str | int], Callable[[Any], Any]]] = [
 ]
 
 
-@pytest.mark.parametrize(("subject", "number", "path", "change"), FIELDS, ids=lambda v: str(v) if v is not None else "")
+@pytest.mark.parametrize(("subject", "number", "path", "change"), FIELDS, ids=lambda v: "" if callable(v) else str(v))
 def test_a_changed_field_is_found_where_it_is(
     recording: Path, tmp_path: Path, subject: str, number: int, path: list[str | int], change: Callable[[Any], Any]
 ) -> None:
