@@ -104,3 +104,34 @@ def test_one_damaged_recording_makes_the_exit_code_1(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["verify", str(tmp_path), "--workers", "1"])
     assert done.exit_code == 1
     assert "1 of 2 recordings have no difference" in done.stdout
+
+
+# --- recover and convert ---
+
+
+def test_recover_reports_what_was_lost_and_ends_with_1(tmp_path: Path) -> None:
+    cut = tmp_path / "points.mcap"
+    cut.write_bytes((KEPT / "points.mcap").read_bytes()[:-2000])
+    done = CliRunner().invoke(app, ["recover", str(cut), "--out", str(tmp_path / "out"), "--json"])
+    (found,) = json.loads(done.stdout)["files"]
+    assert done.exit_code == 1
+    assert set(found) >= {"name", "complete", "messages", "lost_bytes", "written"}
+    assert (found["name"], found["complete"]) == ("points.mcap", False)
+    assert CliRunner().invoke(app, ["info", found["written"]]).exit_code == 0
+
+
+def test_convert_keeps_the_topics_and_the_times(tmp_path: Path) -> None:
+    out = tmp_path / "decisions.mcap"
+    line = ["convert", str(KEPT / "points.mcap"), "--out", str(out), "--topics", "decision, performance", "--json"]
+    done = CliRunner().invoke(app, line)
+    assert done.exit_code == 0
+    assert json.loads(done.stdout)["files"][0]["messages"] == 8
+    counts = json.loads(CliRunner().invoke(app, ["info", str(out), "--json"]).stdout)["counts"]
+    assert counts == {"decision": 4, "performance": 4}
+
+
+def test_convert_refuses_an_end_before_the_start(tmp_path: Path) -> None:
+    line = ["convert", str(KEPT / "points.mcap"), "--out", str(tmp_path / "x.mcap"), "--start", "5", "--end", "1"]
+    done = CliRunner().invoke(app, line)
+    assert isinstance(done.exception, InvalidSettings)
+    assert "must not be before" in done.exception.detail

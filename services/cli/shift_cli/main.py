@@ -18,6 +18,7 @@ from shift_cli import (
     export_command,
     gaze_command,
     info_command,
+    recover_commands,
     replay_command,
     ros2_command,
     simulate_command,
@@ -113,6 +114,8 @@ app.command("simulate")(simulate_command.simulate)
 app.command("verify")(verify_command.verify)
 app.command("info")(info_command.info)
 app.command("export")(export_command.export)
+app.command("recover")(recover_commands.recover)
+app.command("convert")(recover_commands.convert)
 app.command("replay")(replay_command.replay)
 app.command("ros2", context_settings=ros2_command.CONTEXT)(ros2_command.ros2)
 app.add_typer(gaze_command.app, name="gaze")
