@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, RootModel
+from pydantic import AfterValidator, Field, RootModel
 
 from shift_schemas.ids import Id
 from shift_schemas.messages.base import (
@@ -20,6 +20,7 @@ from shift_schemas.messages.base import (
     Text,
     Warnings,
 )
+from shift_schemas.shared_text import shared
 from shift_schemas.timestamps import Stamp
 
 FORMAT = 4
@@ -64,7 +65,7 @@ class Config(Fact):
     number = "version"
 
     version: Count = Field(ge=1, description="1 at the start; each change adds 1.")
-    study: str = Field(description="The study in force as one JSON string.")
+    study: Annotated[str, AfterValidator(shared)] = Field(description="The study in force as one JSON string.")
     author: Author = Field(default="", description="Who changed it, if the name was given.")
 
 

@@ -28,6 +28,7 @@ from shift_schemas.messages import (
     SessionEvent,
     StartSession,
 )
+from shift_schemas.shared_text import shared
 from shift_schemas.timestamps import Stamp
 from shift_study.loading import patched, study_data, study_from_json, study_in_force, study_json, study_of
 from shift_study.study import Study, fixed_changes
@@ -124,7 +125,7 @@ def _start(state: RecorderState | None, command: StartSession, now: Stamp) -> St
         warnings=_start_warnings(study, command),
     )  # fmt: skip
     config = Config(session=command.session, stamp=now, version=1, study=study_json(in_force))
-    original = json.dumps(study_data(study), ensure_ascii=False)
+    original = shared(json.dumps(study_data(study), ensure_ascii=False))
     return Step(RecorderState(fact, config, original), (fact, config), session_answer(fact))
 
 
