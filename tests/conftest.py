@@ -27,7 +27,8 @@ def group_of(path: Path) -> str:
     return str(path.relative_to(TESTS))
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put each test into its group."""
+    """Put each test into its group, before pytest-xdist looks for the groups."""
     for item in items:
         item.add_marker(pytest.mark.xdist_group(group_of(item.path)))

@@ -8,7 +8,7 @@ import pytest
 from support.container_stack import Stack, why_no_engine
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def stack() -> Iterator[Stack]:
     """Build and start the whole mesh under its own project name and port."""
     reason = why_no_engine()
