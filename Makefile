@@ -28,7 +28,7 @@ test: setup-dev                         ## All tests in two processes; PYTEST_AR
 	else \
 	    echo "Tests with containers: left out, since no engine answers."; \
 	fi
-	@$(BIN)/python -m pytest --numprocesses $(PYTEST_WORKERS) --dist loadgroup $(PYTEST_ARGS)
+	@$(BIN)/python -m pytest --numprocesses $(PYTEST_WORKERS) --dist loadscope $(PYTEST_ARGS)
 
 lint: setup-dev                         ## ruff, mypy, and who may import whom
 	@$(BIN)/ruff check .

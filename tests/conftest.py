@@ -10,25 +10,32 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
+from xdist.scheduler import LoadScopeScheduling
 
 settings.register_profile("shift", deadline=None, derandomize=True)  # a busy machine must not fail a property
 settings.load_profile("shift")
 
-TESTS = Path(__file__).parent
 WITH_PROCESSES = ("e2e", "faults", "ros2", "gateway/web", "docs", "cli")
 """Folders whose tests start processes that compete for the processor."""
 
 
-def group_of(path: Path) -> str:
-    """Return the group of a test file; the tests of one group run one after the other."""
-    folder = path.parent.relative_to(TESTS).as_posix()
+def group_of(nodeid: str) -> str:
+    """Return the group of a test: its file, or one group for all tests that start processes."""
+    file = Path(nodeid.partition("::")[0])
+    folder = file.relative_to("tests").parent.as_posix()
     if any(folder == name or folder.startswith(f"{name}/") for name in WITH_PROCESSES):
         return "processes"
-    return str(path.relative_to(TESTS))
+    return file.as_posix()
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put each test into its group, before pytest-xdist looks for the groups."""
-    for item in items:
-        item.add_marker(pytest.mark.xdist_group(group_of(item.path)))
+class GroupScheduling(LoadScopeScheduling):
+    """Gives each group of tests to one worker, the largest group first."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return group_of(str(nodeid))
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> GroupScheduling:
+    """Return the scheduler of pytest-xdist. (Its marker ``xdist_group`` has no effect with pytest 9.2.)"""
+    return GroupScheduling(config, log)

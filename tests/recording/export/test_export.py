@@ -7,6 +7,7 @@ import gzip
 import hashlib
 import json
 import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -248,9 +249,9 @@ def bids(recording: Path, covariates: Path, tmp_path_factory: pytest.TempPathFac
 
 
 def test_bids_validator_finds_no_error(bids: Path) -> None:
-    done = subprocess.run(
-        ["bids-validator-deno", str(bids), "--json"], capture_output=True, text=True, timeout=120, check=False
-    )
+    validator = Path(sys.executable).with_name("bids-validator-deno")
+    line = [str(validator), str(bids), "--json"]
+    done = subprocess.run(line, capture_output=True, text=True, timeout=120, check=False)
     issues = json.loads(done.stdout)["issues"]["issues"]
     assert [issue for issue in issues if issue.get("severity") == "error"] == []
 
