@@ -15,6 +15,9 @@ FOCUSED = """(name) => {
   return Boolean(marked);
 }"""
 
+OPTION = "() => document.querySelector('.q-menu .q-manual-focusable--focused')?.textContent.trim() ?? ''"
+"""The text of the option that the arrow keys have reached."""
+
 
 @dataclass
 class Keyboard:
@@ -47,10 +50,9 @@ class Keyboard:
         self.press("Enter")
         wanted = self.tab.page.get_by_role("option", name=option, exact=True)
         wanted.wait_for()
-        for _ in range(30):
-            if "q-manual-focusable--focused" in (wanted.get_attribute("class") or ""):
-                break
+        while (at := self.tab.page.evaluate(OPTION)) != option:
             self.press("ArrowDown")
+            self.tab.page.wait_for_function(f"at => ({OPTION})() !== at", arg=at)
         self.press("Enter")
         wanted.wait_for(state="hidden")
 
