@@ -6,6 +6,7 @@ import asyncio
 import shutil
 import time
 
+from shift_runtime.bus.protocol import Bus
 from shift_schemas.errors import Unavailable
 from shift_schemas.lifecycle import has_ended
 from shift_schemas.messages import OutboxQuery
@@ -48,17 +49,22 @@ class Preflight:
 
     async def _behind(self) -> int | None:
         """Return how many messages of live sessions the recorder has not read yet; None if it does not answer."""
-        read_model = self._gateway.read_model
-        live = [name for name, view in read_model.views.items() if not has_ended(view.fact.state)]
-        heads = {(name, owner): read_model.reader.cursor(name, owner) or 0 for name in live for owner in OWNERS}
-        query = OutboxQuery(cursors={name: heads[name, "recorder"] for name in live}, only=live, limit=1)
+        mesh, views = self._gateway.mesh, self._gateway.read_model.views
+        live = [name for name, view in views.items() if not has_ended(view.fact.state)]
+        shards = [(bus, [name for name in live if mesh.bus_of(name) is bus]) for bus in mesh.buses]
         try:
-            pages = await asyncio.gather(*(outbox_page(bus, "recorder", query) for bus in self._gateway.mesh.buses))
+            return sum(await asyncio.gather(*(self._behind_in(bus, sessions) for bus, sessions in shards)))
         except Unavailable:
             return None
-        read = {name: cursors for page in pages for name, cursors in page.cursors.items()}
+
+    async def _behind_in(self, bus: Bus, sessions: list[str]) -> int:
+        """Return how many messages of these sessions the recorder of one shard has not read yet."""
+        reader = self._gateway.read_model.reader
+        heads = {(name, owner): reader.cursor(name, owner) or 0 for name in sessions for owner in OWNERS}
+        cursors = {name: heads[name, "recorder"] for name in sessions}
+        page = await outbox_page(bus, "recorder", OutboxQuery(cursors=cursors, only=sessions, limit=1))
         return sum(
-            max(n - read[name].get(owner, 0), 0)
+            max(n - page.cursors[name].get(owner, 0), 0)
             for (name, owner), n in heads.items()
-            if owner != "recorder" and name in read
+            if owner != "recorder" and name in page.cursors
         )

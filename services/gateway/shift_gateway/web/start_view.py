@@ -42,7 +42,8 @@ def service_check(name: str, health: Health | None, heard_ns: int | None) -> Che
         return Check(name, "fault", f"The {name} does not answer; see its log, or start the mesh again.", heard_ns)
     if not health.ready:
         return Check(name, "warning", f"The {name} is not ready: {health.detail or 'it still reads'}.", heard_ns)
-    return Check(name, "ok", f"The {name} is ready, with {health.sessions} sessions in memory.", heard_ns)
+    sessions = "1 session" if health.sessions == 1 else f"{health.sessions} sessions"
+    return Check(name, "ok", f"The {name} is ready, with {sessions} in memory.", heard_ns)
 
 
 def lag_check(behind: int | None, now_ns: int) -> Check:
@@ -50,7 +51,8 @@ def lag_check(behind: int | None, now_ns: int) -> Check:
     if behind is None:
         return Check("lag", "warning", "It is not known how far the recorder has read.", None)
     level: Level = "ok" if behind < LAG_WARNING else "warning"
-    return Check("lag", level, f"The recorder has {behind} messages to read.", now_ns)
+    messages = "1 message" if behind == 1 else f"{behind} messages"
+    return Check("lag", level, f"The recorder has {messages} to read.", now_ns)
 
 
 def disk_check(free: int, total: int, now_ns: int) -> Check:
