@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -76,6 +77,10 @@ def _screen(text: str) -> Screen | None:
 
 
 def _show(done: Exported, out: Path) -> None:
-    rows = ", ".join(f"{count} {table}" for table, count in done.rows.items() if count) or "nothing"
-    typer.echo(f"{len(done.report.read)} recordings: {rows}")
-    typer.echo(f"{len(done.files)} files in {out}/")
+    rows = ", ".join(f"{count} {table.replace('_', ' ')}" for table, count in done.rows.items() if count) or "nothing"
+    typer.echo(f"{_count(done.report.read, 'recording')}: {rows}")
+    typer.echo(f"{_count(done.files, 'file')} in {out}/")
+
+
+def _count(things: Sized, name: str) -> str:
+    return f"{len(things)} {name}" + ("" if len(things) == 1 else "s")
