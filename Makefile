@@ -57,6 +57,8 @@ COMPILE = $(UV) pip compile pyproject.toml --quiet --universal --python-version 
 lock: | $(UV)                           ## Make requirements*.lock anew; LOCK_ARGS=--upgrade for newer versions
 	$(COMPILE) $(LOCK_ARGS) --group dev --output-file requirements-dev.lock
 	$(COMPILE) $(LOCK_ARGS) --constraints requirements-dev.lock --output-file requirements.lock
+	$(COMPILE) $(LOCK_ARGS) --extra export --extra analysis \
+	    --constraints requirements-dev.lock --output-file requirements-analysis.lock
 	$(UV) pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	    --no-annotate --custom-compile-command "make lock" $(LOCK_ARGS) \
 	    --constraints requirements-dev.lock --group pyproject.toml:build --output-file requirements-build.lock
@@ -89,8 +91,9 @@ $(BIN)/pip:
 	echo "Making $(VENV) with $$("$$found" --version)."; \
 	"$$found" -m venv $(VENV)
 
-$(VENV)/.locked: requirements.lock requirements-build.lock | $(BIN)/pip
-	@$(PIP) install --require-hashes --no-deps -r requirements.lock -r requirements-build.lock
+# requirements.lock is what the services need, and what the image has. The analysis of recordings needs more.
+$(VENV)/.locked: requirements-analysis.lock requirements-build.lock | $(BIN)/pip
+	@$(PIP) install --require-hashes --no-deps -r requirements-analysis.lock -r requirements-build.lock
 	@touch $@
 
 $(VENV)/.project: $(VENV)/.locked pyproject.toml

@@ -282,6 +282,41 @@ def test_an_override_holds_for_the_task_s_next_decision_only() -> None:
     assert second.propensity is not None
 
 
+@pytest.mark.parametrize(("format_", "recorded"), [(5, True), (4, False)])
+def test_overridden_decision_records_what_would_have_been_chosen(format_: int, recorded: bool) -> None:
+    for seed in range(20):
+        begun = session(seed=seed).model_copy(update={"format": format_})
+        state = folded(begun, *READY[1:])
+        own = made(state).strategy
+        found = made(override(state).state)
+        assert found.strategy == NEGATED
+        assert found.without_override == (own if recorded else None)
+    assert made(state).without_override is None
+
+
+@pytest.mark.parametrize("minimum", [0.0, 0.02, 0.1, 1 / 6])
+@pytest.mark.parametrize("row", [[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], FIRST_ROW, [0.5, 0.5, 0.0, 0.0, 0.0, 0.0]])
+def test_each_action_keeps_the_minimum_propensity(minimum: float, row: list[float]) -> None:
+    configured = config(decider={"minimum_propensity": minimum})
+    found = made(folded(session(), configured, observation(), policy(row=row)))
+    assert found.probabilities == pytest.approx([(1 - 6 * minimum) * p + minimum for p in row])
+    assert min(found.probabilities) >= min(minimum, 1 / 6)
+    assert sum(found.probabilities) == pytest.approx(1)
+    assert found.propensity == found.probabilities[found.actions.index(found.strategy)]
+    assert found.actions.index(found.strategy) == pick(found.probabilities, uniform(7, 1))
+
+
+def test_minimum_propensity_holds_without_a_policy_and_draws_every_action() -> None:
+    configured = config(decider={"minimum_propensity": 0.1})
+    drawn = Counter(
+        made(folded(session(seed=seed), configured, observation()), timed_out=True).actions.index(
+            made(folded(session(seed=seed), configured, observation()), timed_out=True).strategy
+        )
+        for seed in range(300)
+    )
+    assert len(drawn) == 6
+
+
 def test_an_override_waits_for_its_own_task() -> None:
     step = ask(override(folded(*READY), task="turn").state, task="grasp")
     (other,) = step.facts

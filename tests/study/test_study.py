@@ -44,7 +44,9 @@ def test_every_default_is_the_contract_s(path: str, value: object) -> None:
 
 def test_there_is_no_default_that_the_contract_does_not_show() -> None:
     more = {p for p in leaves(study_data(Study(study="x"))) if p not in DEFAULTS and not p.startswith("learner.")}
-    assert more == {"study", "title", "aois", "scoring.s_max", "blinded"}, "parameters of further learners aside"
+    assert more == {"study", "title", "aois", "scoring.s_max", "blinded", "decider.minimum_propensity"}, (
+        "parameters of further learners aside"
+    )
 
 
 def test_the_contract_s_example_is_a_study() -> None:

@@ -61,6 +61,7 @@ CHANGES: dict[str, Sequence[tuple[Sequence[str | int], Callable[[Any], Any]]]] =
     "seed": [(["seed"], lambda v: v + 1)],
     "override_id": [(["override_id"], lambda v: "another")],
     "reason": [(["reason"], lambda v: "another")],
+    "without_override": [(["without_override"], lambda v: {"negation": "negation", "hesitation": "none"})],
 }
 """Changes of the fields that a decision derives; what it answers (id, task, what was required) is tried below."""
 INPUTS = {"decision_id", "task", "required"}
@@ -205,6 +206,32 @@ def test_metadata_names_the_format_from_3_on(recording: Path, tmp_path: Path) ->
         list(whole.messages())
         metadata.append(whole.metadata["shift:session"].get("format"))
     assert metadata == [str(FORMAT), None]
+
+
+@pytest.mark.parametrize("field", ["without_override", "probabilities"])
+def test_changed_choice_of_shift_where_a_person_overrode_it_is_found(
+    recording: Path, decisions: list[dict[str, Any]], tmp_path: Path, field: str
+) -> None:
+    number = next(d["n"] - 1 for d in decisions if d["policy_source"] == "override")
+    difference = found(recording, tmp_path, number, [field], _other_choice if field == "without_override" else _rotated)
+    assert difference.subject == "decision"
+    assert difference.field.startswith(field)
+
+
+def _other_choice(choice: dict[str, str]) -> dict[str, str]:
+    return {**choice, "hesitation": "none" if choice["hesitation"] == "hesitation" else "hesitation"}
+
+
+def _rotated(row: list[float]) -> list[float]:
+    return [*row[1:], row[0] + 0.001]
+
+
+def test_recording_with_a_minimum_propensity_verifies(tmp_path: Path) -> None:
+    session = Session({"decider": {"minimum_propensity": 0.05}, "learner": {"name": "ucb1"}}, seed=11)
+    path = session.interactions(30).ended().finished(tmp_path)
+    assert verify(path).ok
+    rows = [json.loads(m.data)["probabilities"] for m in Recording(path).messages({"decision"})]
+    assert all(min(row) >= 0.05 for row in rows)
 
 
 def test_dropped_estimate_of_an_unchanged_configuration_is_missed(tmp_path: Path) -> None:

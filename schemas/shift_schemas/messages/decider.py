@@ -80,6 +80,9 @@ class Decision(Fact):
     )
     override_id: str = Field(default="", description="The override that it follows; '' is no override.")
     reason: str = Field(default="", description="The override's reason.")
+    without_override: Strategy | None = Field(
+        default=None, description="What SHIFT would have chosen without the override; left out without one."
+    )
 
 
 class Override(Fact):

@@ -23,13 +23,13 @@ from shift_schemas.messages.base import (
 from shift_schemas.shared_text import shared
 from shift_schemas.timestamps import Stamp
 
-FORMAT = 4
+FORMAT = 5
 """The format that a new session records in. A session keeps the format that it began with.
 
 1: no shares of gaze, no warnings, no restarts. 2: an estimate is published only where it changes, and a decision does
 not record what it required. 3: a configuration always publishes its estimates, and a decision records ``required``.
 4: an observation follows a chunk of gaze only where its class or its warnings change, after 250 ms of the source's
-time, or where somebody needs it.
+time, or where somebody needs it. 5: an overridden decision records what SHIFT would have chosen.
 """
 
 

@@ -20,10 +20,12 @@ from shift_cli import (
     info_command,
     recover_commands,
     replay_command,
+    robust_command,
     ros2_command,
     simulate_command,
     study_command,
     verify_command,
+    whatif_command,
 )
 
 app = typer.Typer(
@@ -112,6 +114,8 @@ def router() -> None:
 app.command("doctor")(doctor_command.doctor)
 app.command("simulate")(simulate_command.simulate)
 app.command("verify")(verify_command.verify)
+app.command("whatif")(whatif_command.whatif)
+app.command("robust")(robust_command.robust)
 app.command("info")(info_command.info)
 app.command("export")(export_command.export)
 app.command("recover")(recover_commands.recover)

@@ -67,6 +67,11 @@ class DeciderState:
         """Whether the outputs record the order of the inputs and what each decision required: from format 3 on."""
         return self.format >= 3
 
+    @property
+    def records_own_choice(self) -> bool:
+        """Whether an overridden decision records what SHIFT would have chosen: from format 5 on."""
+        return self.format >= 5
+
 
 _STATE = TypeAdapter(DeciderState)
 
@@ -242,6 +247,7 @@ def decide(state: DeciderState, task: str, decision_id: str, required: Seen, now
         ),
         required=required if state.records_inputs else None,
         override_id=override.override_id if override else "", reason=override.reason if override else "",
+        without_override=choices[choice.own] if override and state.records_own_choice else None,
     )  # fmt: skip
 
 
@@ -262,6 +268,8 @@ class Choice(NamedTuple):
     explored: bool
     source: PolicySource
     state: str
+    own: int
+    """The action that SHIFT chose; another than ``action`` only where a person overrode it."""
 
 
 def _choose(
@@ -277,12 +285,24 @@ def _choose(
         row = policy.states[name].probabilities
         values = policy.states[name].values
         greedy = values.index(max(values))
+    row = with_minimum(row, study.decider.minimum_propensity)
+    own = pick(row, uniform(state.seed, state.n + 1))
     if override := state.overrides.get(task):
         action = actions.index(tuple(override.strategy[s] for s in study.scoring.strategies))
-        return Choice(action, row, None, False, "override", name)
-    action = pick(row, uniform(state.seed, state.n + 1))
+        return Choice(action, row, None, False, "override", name, own)
     source: PolicySource = "scoring" if policy is None else "last_policy" if missing.policy else "learner"
-    return Choice(action, row, row[action], action != greedy, source, name)
+    return Choice(own, row, row[own], own != greedy, source, name, own)
+
+
+def with_minimum(row: list[float], minimum: float) -> list[float]:
+    """Return the row mixed with the uniform one, so that each action has at least the probability ``minimum``.
+
+    An action keeps the share 1 - n * minimum of its probability, where n is the number of actions.
+    """
+    if minimum <= 0:
+        return row
+    kept = max(0.0, 1 - len(row) * minimum)
+    return [max(minimum, kept * p + minimum) for p in row]
 
 
 # --- overrides ---

@@ -108,3 +108,7 @@ class DeciderSettings(StudyPart):
     wait_s: Annotated[float, Field(ge=0, le=300)] = Field(
         default=2.0, description="How long a decision waits until your earlier data is processed, s; 0 never waits."
     )
+    minimum_propensity: Probability = Field(
+        default=0.0,
+        description="Least probability of each action, so that what-if can judge other policies; 0 changes nothing.",
+    )

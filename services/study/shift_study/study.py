@@ -93,6 +93,10 @@ class Study(StudyPart):
                 f"attention.distracted_dominance is {self.attention.distracted_dominance}; it must not exceed "
                 f"attention.focused_dominance, which is {self.attention.focused_dominance}"
             )
+        if (least := self.decider.minimum_propensity) * len(self.scoring.actions) > 1 + MARGIN:
+            raise ValueError(
+                f"decider.minimum_propensity is {least}; times {len(self.scoring.actions)} actions it must not exceed 1"
+            )
         if self.require_condition and not self.conditions:
             raise ValueError("require_condition is true and the study has no conditions; write conditions, or false")
         for name, overrides in self.conditions.items():

@@ -32,7 +32,7 @@ from shift_schemas.timestamps import Stamp
 
 from shift_verify.difference import FactAtPlace, NotRecorded, differ
 from shift_verify.inputs import Inputs
-from shift_verify.output_fold import OutputFold
+from shift_verify.output_fold import OnStep, OutputFold, ignore_step
 
 
 class MonitorFold(OutputFold):
@@ -43,8 +43,8 @@ class MonitorFold(OutputFold):
     _stepped: Step[Any] | None = None
     """The step of the open group's chunk, from which its length was taken; :meth:`step` returns it once."""
 
-    def __init__(self, inputs: Inputs) -> None:
-        super().__init__(inputs)
+    def __init__(self, inputs: Inputs, on_step: OnStep = ignore_step) -> None:
+        super().__init__(inputs, on_step)
         self._numbers: dict[tuple[str, int], tuple[int, ...]] = {}
         """By source and chunk number: the segments in which the number was used."""
         self._last: FactAtPlace | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from shift_schemas.core_protocol import Step
@@ -13,6 +13,13 @@ from shift_schemas.timestamps import Stamp
 
 from shift_verify.difference import FactAtPlace, compare, differ, is_missing
 from shift_verify.inputs import Inputs
+
+OnStep = Callable[[object, Stamp, Step[Any]], None]
+"""Called with each input of an owner, its time, and the step that was derived from it; the first is the session."""
+
+
+def ignore_step(event: object, now: Stamp, step: Step[Any]) -> None:
+    """Do nothing with a step."""
 
 
 class OutputFold:
@@ -25,12 +32,15 @@ class OutputFold:
     closing: type[Fact]
     """The type of the fact that ends each group."""
 
-    def __init__(self, inputs: Inputs) -> None:
+    def __init__(self, inputs: Inputs, on_step: OnStep = ignore_step) -> None:
         self.inputs = inputs
+        self.on_step = on_step
         self.group: list[FactAtPlace] = []
         self.checked: Counter[str] = Counter()
         self.sequence = 0
-        self.state: Any = self.step(None, inputs.session, inputs.session.stamp).state
+        first = self.step(None, inputs.session, inputs.session.stamp)
+        self.state: Any = first.state
+        on_step(inputs.session, inputs.session.stamp, first)
 
     def step(self, state: Any, event: object, now: Stamp) -> Step[Any]:
         """Return the step of the core, without waiting."""
@@ -104,4 +114,6 @@ class OutputFold:
             extra = group[len(step.facts)]
             differ(extra, "", extra.fact.subject, None, "it does not follow from anything")
         self.checked.update(placed.fact.subject for placed in group)
+        if whole:
+            self.on_step(event, group[0].fact.stamp, step)
         return step

@@ -25,6 +25,7 @@ from shift_verify.difference import Difference, Differs
 from shift_verify.guarded_fold import GuardedFold
 from shift_verify.inputs import Inputs
 from shift_verify.monitor_learner import LearnerFold, MonitorFold
+from shift_verify.output_fold import OnStep, ignore_step
 from shift_verify.provenance import check_provenance
 from shift_verify.recorded_messages import OnProgress, RecordedMessages
 from shift_verify.recorder import RecorderFold
@@ -56,7 +57,18 @@ class VerifyReport:
         }  # fmt: skip
 
 
-def verify(path: Path, on_progress: OnProgress | None = None) -> VerifyReport:
+@dataclass(frozen=True)
+class Observers:
+    """Functions that are called with the inputs of the learner and of the monitor while both are derived again.
+
+    The learner is derived first. An observer reads the steps; it does not change them.
+    """
+
+    learner: OnStep = ignore_step
+    monitor: OnStep = ignore_step
+
+
+def verify(path: Path, on_progress: OnProgress | None = None, observers: Observers = Observers()) -> VerifyReport:
     """Verify one recording, finished or not.
 
     Raises
@@ -69,7 +81,7 @@ def verify(path: Path, on_progress: OnProgress | None = None) -> VerifyReport:
     except DamagedRecording as e:
         difference = Difference("checksum", 0, "", None, None, e.detail)
         return VerifyReport(path.name, False, False, "differs", {}, difference)
-    verification = _Verification(path, on_progress)
+    verification = _Verification(path, on_progress, observers)
     verification.run()
     checked = verification.checked
     first = min(verification.differences, key=lambda d: d.rank, default=None)
@@ -87,9 +99,10 @@ def verify(path: Path, on_progress: OnProgress | None = None) -> VerifyReport:
 class _Verification:
     """One run over a recording."""
 
-    def __init__(self, path: Path, on_progress: OnProgress | None) -> None:
+    def __init__(self, path: Path, on_progress: OnProgress | None, observers: Observers) -> None:
         self.messages = RecordedMessages(path)
         self.on_progress = on_progress
+        self.observers = observers
         self.differences: list[Differs] = []
         self.reasons: list[str] = []
         """Why the recording is not complete, and where it does not say more."""
@@ -146,7 +159,7 @@ class _Verification:
 
     def _derive_learner(self, inputs: Inputs) -> None:
         if self._has_beginning("learner"):
-            fold = self._guard("learner", LearnerFold(inputs))
+            fold = self._guard("learner", LearnerFold(inputs, self.observers.learner))
             self._take_all(fold, "learner")
             fold.end()
 
@@ -154,7 +167,7 @@ class _Verification:
         """Derive both in the second pass: the decider gets each observation that is as derived."""
         if not self._has_beginning("monitor"):
             return
-        monitor = self._guard("monitor", MonitorFold(inputs))
+        monitor = self._guard("monitor", MonitorFold(inputs, self.observers.monitor))
         decider = None
         if self._has_beginning("decider"):
             outputs = self.messages.owners["decider"]

@@ -1,0 +1,1 @@
+"""Decide recordings again: under another study or learner, and with disturbed gaze."""
