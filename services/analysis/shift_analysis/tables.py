@@ -6,14 +6,13 @@ import csv
 import io
 from typing import Any
 
+from shift_study.prior_file import FORMAT
+
 from shift_analysis.whatif import WhatIf
 
 COLUMNS = ("participant", "session", "n", "decision_id", "task", "policy_source", "cognitive_state",
            "other_cognitive_state", "strategy", "own_strategy", "other_strategy", "differs", "propensity",
            "other_propensity", "weight", "reward", "supported")  # fmt: skip
-
-WIZARD_FORMAT = 1
-"""The format of the policy table that this version writes."""
 
 
 def decisions_csv(answer: WhatIf) -> str:
@@ -37,13 +36,13 @@ def decisions_csv(answer: WhatIf) -> str:
 def wizard_table(answer: WhatIf) -> dict[str, Any]:
     """Return the policy of the people who overrode SHIFT: how often each strategy was chosen in each state.
 
-    A study can start from it: ``learner: {prior: {STATE: {STRATEGY: SHARE}}}`` takes ``states``.
+    A study can start from it: ``learner: {prior: FILE}``.
     """
     states = {
         name: {action: count / state.overrides for action, count in zip(answer.actions, state.chosen, strict=True)}
         for name, state in answer.wizard.items()
     }
     return {
-        "format": WIZARD_FORMAT, "actions": list(answer.actions),
+        "format": FORMAT, "actions": list(answer.actions),
         "overrides": {name: state.overrides for name, state in answer.wizard.items()}, "states": states,
     }  # fmt: skip

@@ -17,9 +17,9 @@ from shift_model.vocabulary import LearnerName
 from shift_recording.export.sources import first_session
 from shift_recording.parallel import for_each
 from shift_schemas.errors import InvalidStudy, MalformedMessage, ShiftError
-from shift_schemas.messages import Strategy
 from shift_schemas.suggestions import did_you_mean
 from shift_study.loading import patched, study_from_json, study_in_force, study_json
+from shift_study.scoring_table import strategy_name
 from shift_study.study import Study
 from shift_verify.verify import verify
 
@@ -37,11 +37,6 @@ FEW = 30
 """Chosen: below this effective sample size the intervals are not to be relied on."""
 LARGE_WEIGHT = 0.1
 """Chosen: a single decision with more than this share of all weights decides the estimate."""
-
-
-def strategy_name(strategy: Strategy) -> str:
-    """Return the levels of a strategy as one name: ``negation + hesitation``."""
-    return " + ".join(strategy.values())
 
 
 @dataclass(frozen=True)

@@ -81,8 +81,9 @@ def with_progress(what: str, results: Iterable[Each], total: int) -> Iterator[Ea
 
 def _policy(study: Path | None, learner: str) -> OtherPolicy:
     from shift_analysis.whatif import OtherPolicy
+    from shift_runtime.study_files import check_file
     from shift_schemas.errors import InvalidSettings, UnknownThing
-    from shift_study.loading import parse_study, study_json
+    from shift_study.loading import study_json
 
     if study is None and not learner:
         raise InvalidSettings("give --study FILE, --learner NAME, or both: the policy to compare with")
@@ -90,7 +91,10 @@ def _policy(study: Path | None, learner: str) -> OtherPolicy:
         return OtherPolicy(learner=learner)
     if not study.is_file():
         raise UnknownThing(f"there is no study file {study}; shift-mesh study show NAME writes a built-in study")
-    return OtherPolicy(study_json(parse_study(study.read_text("utf-8"), study.name)), learner)
+    found = check_file(study, str(study))
+    if found.study is None:
+        raise found.error or InvalidSettings("; ".join(found.mistakes))
+    return OtherPolicy(study_json(found.study), learner)
 
 
 def _write(answer: WhatIf, out: Path, name: str) -> None:

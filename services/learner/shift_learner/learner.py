@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 from shift_model.vocabulary import TRIPLES
 from shift_study.scoring import suggestions
+from shift_study.scoring_table import strategy_name
 from shift_study.study import Study
 
 
@@ -31,6 +32,24 @@ class Context:
     def actions(self) -> int:
         """The number of actions."""
         return len(self.study.scoring.actions)
+
+    @cached_property
+    def prior(self) -> tuple[tuple[float, ...], ...]:
+        """How much the prior prefers each action in each cognitive state, 0..1, in the actions' order.
+
+        With the scoring prior it is 1 for the suggested action and 0 for the others. A table of the study stands in its
+        place: there it is an action's share, divided by the state's largest share. All is 0 without a prior.
+        """
+        settings, scoring = self.study.learner, self.study.scoring
+        names = [strategy_name(choice) for choice in scoring.choices]
+        rows = []
+        for index, state in enumerate(scoring.states):
+            shares = (settings.prior or {}).get(state, {})
+            if largest := max(shares.values(), default=0.0):
+                rows.append(tuple(shares.get(name, 0.0) / largest for name in names))
+            else:
+                rows.append(tuple(float(settings.scoring_prior and a == index) for a in range(self.actions)))
+        return tuple(rows)
 
     @cached_property
     def cognitive_states(self) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 from collections.abc import Iterator
+from functools import partial
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
@@ -50,7 +51,7 @@ def check_file(path: Traversable, place: str) -> CheckedStudy:
     name = _stem(path)
     try:
         _check_name(name, path.name)
-        study = parse_study(_text(path), path.name)
+        study = parse_study(_text(path), path.name, partial(_beside, path))
     except InvalidStudy as e:
         return CheckedStudy(name, place, None, e.sentences, (), e)
     warnings = (*_name_warnings(study, path), *_stimulus_warnings(study, path), *study_warnings(study))
@@ -191,6 +192,13 @@ def _refused(name: str, rule: str) -> InvalidStudy:
 
 
 # --- text ---
+
+
+def _beside(path: Traversable, name: str) -> str:
+    """Return the text of a file in the folder of a study file. Raises OSError, ValueError."""
+    if not isinstance(path, Path) or Path(name).name != name:
+        raise ValueError("give the name of a file in the study's folder, without a path")
+    return (path.parent / name).read_text(encoding="utf-8")
 
 
 def _text(path: Traversable) -> str:

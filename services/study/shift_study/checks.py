@@ -122,7 +122,8 @@ def _given(settings: LearnerSettings) -> list[str]:
     """Return the parameters that were written; if all are written, those that differ from their default."""
     parameters = [key for key in LearnerSettings.model_fields if key not in COMMON]
     written = [key for key in parameters if key in settings.model_fields_set]
-    if len(written) < len(parameters):
+    with_value = [key for key in parameters if LearnerSettings.model_fields[key].default is not None]
+    if not set(with_value) <= set(written):
         return written
     return [key for key in parameters if getattr(settings, key) != LearnerSettings.model_fields[key].default]
 

@@ -48,6 +48,14 @@ class _PriorStrength(LearnerChoice):
     )
 
 
+class _PriorTable(LearnerChoice):
+    prior: dict[str, dict[str, Probability]] | None = Field(
+        default=None,
+        description="Shares of strategies by cognitive state, in place of the scoring prior; or the name of a JSON file "
+        "beside the study file, as whatif writes it (wizard.json).",
+    )
+
+
 # --- one class for each learner; its own parameters first ---
 
 
@@ -56,11 +64,11 @@ class _LearningRate(LearnerChoice):
     discount: Probability = Field(default=0.0, description="γ of q-learning; paper.")
 
 
-class QLearningSettings(_PriorValue, _ScoringPrior, _Epsilon, _LearningRate):
+class QLearningSettings(_PriorTable, _PriorValue, _ScoringPrior, _Epsilon, _LearningRate):
     """Tabular Q-learning, the paper's learner."""
 
 
-class EpsilonGreedySettings(_PriorValue, _ScoringPrior, _Epsilon):
+class EpsilonGreedySettings(_PriorTable, _PriorValue, _ScoringPrior, _Epsilon):
     """Epsilon-greedy over mean rewards."""
 
 
@@ -70,7 +78,7 @@ class _Exploration(LearnerChoice):
     )
 
 
-class Ucb1Settings(_Exploration, _PriorValue, _ScoringPrior):
+class Ucb1Settings(_Exploration, _PriorTable, _PriorValue, _ScoringPrior):
     """Upper confidence bounds (UCB1)."""
 
 
@@ -80,7 +88,7 @@ class _ThompsonStates(LearnerChoice):
     )
 
 
-class ThompsonSettings(_PriorStrength, _ThompsonStates, _ScoringPrior):
+class ThompsonSettings(_PriorTable, _PriorStrength, _ThompsonStates, _ScoringPrior):
     """Thompson sampling with Beta posteriors."""
 
 

@@ -16,14 +16,17 @@ from shift_schemas.suggestions import did_you_mean
 from shift_study.area_checks import area_mistakes
 from shift_study.mistakes import MISTAKES, Lines, Mistake, mistakes_of, refusal
 from shift_study.patching import merge_patch
+from shift_study.prior_file import ReadBeside, read_prior_files
 from shift_study.scoring_table import DEFAULT_STRATEGIES, DEFAULT_TABLE
 from shift_study.shape import Path
 from shift_study.study import Study
 from shift_study.yaml_reader import read_yaml
 
 
-def parse_study(text: str, name: str = "study") -> Study:
+def parse_study(text: str, name: str = "study", read_beside: ReadBeside | None = None) -> Study:
     """Return the study of a text in YAML or JSON; ``name`` is the file's, for the message.
+
+    ``read_beside`` returns the text of a file beside the study, which can hold a learner's prior.
 
     Raises
     ------
@@ -31,6 +34,8 @@ def parse_study(text: str, name: str = "study") -> Study:
         With one field error per mistake; the message gives ``file:line``.
     """
     data, lines = read_yaml(text, name)
+    if read_beside is not None and (found := read_prior_files(data, lines, read_beside)):
+        raise refusal(name, found)
     return checked(study_of(data, name, lines), name, lines)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
 from itertools import product
 from typing import Annotated, Any
@@ -184,6 +185,11 @@ class ScoringSettings(StudyPart):
     def strategy(self, action: tuple[str, ...]) -> dict[str, str]:
         """Return an action as messages carry it: ``{"negation": "affirmation", "hesitation": "none"}``."""
         return dict(zip(self.strategies, action, strict=True))
+
+
+def strategy_name(strategy: Mapping[str, str]) -> str:
+    """Return the levels of an action as one name: ``negation + hesitation``."""
+    return " + ".join(strategy.values())
 
 
 def _columns(table: dict[str, dict[str, dict[str, float]]], strategies: Any) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from shift_study.constants import (
 )
 from shift_study.fields import StimulusFile, StudyPart
 from shift_study.learner_settings import LearnerSettings
-from shift_study.scoring_table import ScoringSettings
+from shift_study.scoring_table import ScoringSettings, strategy_name
 
 
 class Study(StudyPart):
@@ -97,6 +97,7 @@ class Study(StudyPart):
             raise ValueError(
                 f"decider.minimum_propensity is {least}; times {len(self.scoring.actions)} actions it must not exceed 1"
             )
+        self._check_prior()
         if self.require_condition and not self.conditions:
             raise ValueError("require_condition is true and the study has no conditions; write conditions, or false")
         for name, overrides in self.conditions.items():
@@ -105,6 +106,17 @@ class Study(StudyPart):
                     f"conditions.{name} overrides {', '.join(fixed)}; it can override {', '.join(sorted(CONDITIONAL))}"
                 )
         return self
+
+    def _check_prior(self) -> None:
+        """Raise ValueError if ``learner.prior`` names a state or a strategy that the study does not have."""
+        states, names = self.scoring.states, [strategy_name(choice) for choice in self.scoring.choices]
+        for state, shares in (self.learner.prior or {}).items():
+            if state not in states:
+                raise ValueError(f"learner.prior has the state {state!r}; the study has {', '.join(states)}")
+            if unknown := [name for name in shares if name not in names]:
+                raise ValueError(
+                    f"learner.prior.{state} has the strategy {unknown[0]!r}; the study has {', '.join(names)}"
+                )
 
     @property
     def aoi_names(self) -> tuple[str, ...]:

@@ -35,11 +35,9 @@ class QLearning:
 
     def initial(self, context: Context) -> Memory:
         """Return Q0, with no action taken."""
-        settings = context.study.learner
-        prior = settings.prior_value if settings.scoring_prior else 0.0
-        n = context.actions
+        value, n = context.study.learner.prior_value, context.actions
         return Memory(
-            values=tuple(tuple(prior if action == state else 0.0 for action in range(n)) for state in range(n)),
+            values=tuple(tuple(value * preference for preference in row) for row in context.prior),
             visits=((0,) * n,) * n,
             taken=(False,) * n,
         )

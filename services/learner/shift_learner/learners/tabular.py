@@ -77,10 +77,9 @@ class Tabular:
 
 
 def prior_values(context: Context, triple: int) -> list[float]:
-    """Return ``prior_value`` for the suggested action and 0 for the others, or all 0 without the scoring prior."""
-    settings = context.study.learner
-    prior = settings.prior_value if settings.scoring_prior else 0.0
-    return [prior if action == context.suggestions[triple] else 0.0 for action in range(context.actions)]
+    """Return the value of each action before any report: ``prior_value`` times the preference of the prior."""
+    value = context.study.learner.prior_value
+    return [value * preference for preference in context.prior[context.suggestions[triple]]]
 
 
 def greedy(values: list[float]) -> list[float]:

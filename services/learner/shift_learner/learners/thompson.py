@@ -67,10 +67,10 @@ class Thompson:
             [sum(counts[t][action] for t in alike) for action in range(context.actions)]
             for counts in (memory.successes, memory.failures)
         )
-        strength = settings.prior_strength if settings.scoring_prior else 0.0
-        suggested = [action == context.suggestions[state] for action in range(context.actions)]
-        a = tuple(1 + n + strength * yes for n, yes in zip(successes, suggested, strict=True))
-        b = tuple(1 + n + strength * (not yes) for n, yes in zip(failures, suggested, strict=True))
+        prior = context.prior[context.suggestions[state]]
+        strength = settings.prior_strength if any(prior) else 0.0
+        a = tuple(1 + n + strength * preferred for n, preferred in zip(successes, prior, strict=True))
+        b = tuple(1 + n + strength * (1 - preferred) for n, preferred in zip(failures, prior, strict=True))
         means = [x / (x + y) for x, y in zip(a, b, strict=True)]
         visits = [s + f for s, f in zip(successes, failures, strict=True)]
         return Row(list(chances(a, b)), means, visits)
