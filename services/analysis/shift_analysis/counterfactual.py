@@ -8,8 +8,8 @@ the person's answer to another strategy is not known and is not invented.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from shift_decider.core import DeciderState, decide
@@ -142,10 +142,11 @@ class Redecider:
         """
         if number in self._refused:
             raise self._refused[number]
-        shadow = _Shadow(self, self.alternatives[number], self._observations[number])
+        assert self.session is not None
+        shadow = OtherDecider(self.session, self.alternatives[number], self._observations[number])
         for given in self._learner_inputs:
-            shadow.take(given)
-        return shadow.decisions
+            shadow.take(given.event, given.now, given.policy)
+        return [replace(each, reward=self.rewards.get(each.logged.decision_id)) for each in shadow.decisions]
 
 
 def _monitor_after(
@@ -171,37 +172,49 @@ def with_study(config: Config, alternative: Alternative) -> Config:
     return config.model_copy(update={"study": alternative.study_of(config.study)})
 
 
-class _Shadow:
-    """The learner and the decider of one alternative, stepped with the recorded decisions and reports."""
+class OtherDecider:
+    """The learner and the decider of one alternative, stepped with the recorded decisions and reports.
 
-    def __init__(self, redecider: Redecider, alternative: Alternative, observations: dict[int, Observation]) -> None:
-        assert redecider.session is not None
-        self.session = redecider.session
-        self.rewards = redecider.rewards
+    Parameters
+    ----------
+    session
+        The session as it began.
+    alternative
+        Gives the study.
+    observations
+        The observations of the alternative's monitor, by the version of the recorded observation in whose place they
+        stand. A decision without one is left out.
+    """
+
+    def __init__(self, session: Session, alternative: Alternative, observations: Mapping[int, Observation]) -> None:
+        self.session = session
         self.alternative = alternative
         self.observations = observations
-        self.state: learner.LearnerState | None = None
-        self.configs: dict[int, Config] = {}
-        self.policies: dict[int, Policy] = {}
         self.decisions: list[DecidedAgain] = []
+        """The decisions so far, without rewards."""
+        self._state: learner.LearnerState | None = None
+        self._configs: dict[int, Config] = {}
+        self._policies: dict[int, Policy] = {}
 
-    def take(self, given: _LearnerInput) -> None:
-        """Step the learner with an input. A decision is decided first."""
-        event = given.event
+    def take(self, event: object, now: Stamp, policy: int) -> None:
+        """Step the learner with a recorded input. A decision is decided again before.
+
+        ``policy`` is the version of the recorded policy that followed the input; 0 if none did.
+        """
         if isinstance(event, Config):
-            event = self.configs[event.version] = with_study(event, self.alternative)
+            event = self._configs[event.version] = with_study(event, self.alternative)
         elif isinstance(event, Decision):
             if event.versions.observation not in self.observations:
                 return
             other = self._decide(event)
-            self.decisions.append(DecidedAgain(event, other, self.rewards.get(event.decision_id)))
+            self.decisions.append(DecidedAgain(event, other, None))
             event = _as_learned_from(event, other)
         elif isinstance(event, ReportPerformance) and not self._knows(event.decision_id):
             return
-        step = learner.step(self.state, event, given.now, timed_out=True)  # type: ignore[arg-type]
-        self.state = step.state
-        if given.policy and step.facts and isinstance(policy := step.facts[-1], Policy):
-            self.policies[given.policy] = policy
+        step = learner.step(self._state, event, now, timed_out=True)  # type: ignore[arg-type]
+        self._state = step.state
+        if policy and step.facts and isinstance(published := step.facts[-1], Policy):
+            self._policies[policy] = published
 
     def _knows(self, decision_id: str) -> bool:
         return any(each.logged.decision_id == decision_id for each in self.decisions)
@@ -209,9 +222,9 @@ class _Shadow:
     def _decide(self, logged: Decision) -> Decision:
         """Return the decision that would have been made in place of a recorded one. An override has no effect on it."""
         state = DeciderState(
-            session=logged.session, seed=self.session.seed, config=self.configs[logged.versions.config],
+            session=logged.session, seed=self.session.seed, config=self._configs[logged.versions.config],
             observation=self.observations[logged.versions.observation],
-            policy=self.policies.get(logged.versions.policy), n=logged.n - 1, format=self.session.format,
+            policy=self._policies.get(logged.versions.policy), n=logged.n - 1, format=self.session.format,
         )  # fmt: skip
         return decide(state, logged.task, logged.decision_id, Seen(), logged.stamp, timed_out=True)
 

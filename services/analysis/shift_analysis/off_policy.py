@@ -139,13 +139,19 @@ def _snips(logged: LoggedDecisions, weights: Floats) -> tuple[float, Floats]:
 
 
 def _dr(logged: LoggedDecisions, weights: Floats) -> tuple[float, Floats]:
-    model = reward_model(logged)
-    used = model[np.arange(len(logged)), logged.action]
-    terms = (logged.other * model).sum(axis=1) + weights * (logged.reward - used)
+    terms = doubly_robust_terms(logged)
     return float(terms.mean()), terms - terms.mean()
 
 
 _ESTIMATORS = {"ips": _ips, "snips": _snips, "dr": _dr}
+
+
+def doubly_robust_terms(logged: LoggedDecisions) -> Floats:
+    """Return the term of each decision; their mean is the doubly robust value."""
+    model = reward_model(logged)
+    used = model[np.arange(len(logged)), logged.action]
+    terms: Floats = (logged.other * model).sum(axis=1) + logged.weights * (logged.reward - used)
+    return terms
 
 
 def reward_model(logged: LoggedDecisions) -> Floats:

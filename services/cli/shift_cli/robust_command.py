@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from shift_cli.whatif_command import Files, Json, Scheduler, Workers, with_progress
+from shift_cli.recording_options import Files, Json, Scheduler, Workers, with_progress
 
 if TYPE_CHECKING:
     from rich.table import Table

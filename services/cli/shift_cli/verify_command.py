@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from shift_cli.recording_options import Files, Json, Scheduler, Workers, with_progress
 
 if TYPE_CHECKING:
     from shift_verify.many import RecordingReport
@@ -14,14 +15,13 @@ if TYPE_CHECKING:
 
 
 def verify(
-    files: Annotated[list[Path], typer.Argument(help="Recordings, and folders of recordings.", envvar="SHIFT_FILES")],
+    files: Files,
     report: Annotated[
         Path | None, typer.Option(help="Also write a readable report, in Markdown.", envvar="SHIFT_REPORT")
     ] = None,
-    workers: Annotated[
-        int, typer.Option(help="Recordings at the same time; 0: one for each core.", min=0, envvar="SHIFT_WORKERS")
-    ] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
+    workers: Workers = 0,
+    scheduler: Scheduler = "",
+    as_json: Json = False,
 ) -> None:
     """Derive every output of a recording again from its inputs, and report the first difference.
 
@@ -38,7 +38,7 @@ def verify(
     from shift_recording.files import recordings_in
 
     paths = recordings_in(files)
-    reports = _reports(paths, workers or os.cpu_count() or 1)
+    reports = _reports(paths, workers, scheduler)
     if report is not None:
         _write(report, reports)
     verified = [each.verified for each in reports]
@@ -53,22 +53,18 @@ def verify(
     raise typer.Exit(0 if all(v.ok for v in verified) else 1)
 
 
-def _reports(paths: tuple[Path, ...], workers: int) -> list[RecordingReport]:
+def _reports(paths: tuple[Path, ...], workers: int, scheduler: str) -> list[RecordingReport]:
     from rich.console import Console
     from rich.progress import Progress
     from shift_verify.many import report_on, report_on_many
 
+    if len(paths) > 1 or scheduler:
+        found = report_on_many(paths, workers, scheduler)
+        return list(with_progress(f"verifying {len(paths)} recordings", found, len(paths)))
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        if len(paths) == 1:
-            task = bar.add_task(f"verifying {paths[0].name}", total=None)
-            return [report_on(paths[0], lambda done, total: bar.update(task, completed=done, total=total))]
-        task = bar.add_task(f"verifying {len(paths)} recordings", total=len(paths))
-        found = []
-        for each in report_on_many(paths, workers):
-            found.append(each)
-            bar.advance(task)
-        return found
+        task = bar.add_task(f"verifying {paths[0].name}", total=None)
+        return [report_on(paths[0], lambda done, total: bar.update(task, completed=done, total=total))]
 
 
 def _all_as_json(reports: list[RecordingReport]) -> dict[str, object]:

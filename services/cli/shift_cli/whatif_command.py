@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from shift_cli.recording_options import Files, Json, Scheduler, Workers, with_progress
 
 if TYPE_CHECKING:
     from rich.table import Table
     from shift_analysis.whatif import OtherPolicy, WhatIf
-
-Files = Annotated[list[Path], typer.Argument(help="Recordings, and folders of recordings.", envvar="SHIFT_FILES")]
-Workers = Annotated[
-    int, typer.Option(help="Recordings at the same time; 0: one for each core.", min=0, envvar="SHIFT_WORKERS")
-]
-Scheduler = Annotated[
-    str, typer.Option(help="A Dask scheduler, tcp://HOST:PORT, that does the work.", envvar="SHIFT_SCHEDULER")
-]
-Json = Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")]
-Each = TypeVar("Each")
 
 
 def whatif(
@@ -64,19 +55,6 @@ def whatif(
     for name, problem in answer.problems.items():
         typer.echo(f"{name} was left out: {problem}", err=True)
     raise typer.Exit(1 if answer.problems else 0)
-
-
-def with_progress(what: str, results: Iterable[Each], total: int) -> Iterator[Each]:
-    """Yield the results, with a progress bar on standard error."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=total)
-        for result in results:
-            yield result
-            bar.advance(task)
 
 
 def _policy(study: Path | None, learner: str) -> OtherPolicy:

@@ -166,9 +166,14 @@ def reward_table(settings: RewardSettings) -> Floats:
     return reward_of(performance[:, :, None], performance[:, None, :], settings.scale)
 
 
-def check_simulable(study: Study) -> None:
-    """Raise :class:`InvalidSettings` for a study that the tables of simulated users do not fit."""
+def check_actions(study: Study) -> None:
+    """Raise :class:`InvalidSettings` unless the study has the actions of the simulated users."""
     if len(study.scoring.actions) != ACTIONS:
         raise InvalidSettings(f"simulated users have {ACTIONS} actions; the study has {len(study.scoring.actions)}")
+
+
+def check_simulable(study: Study) -> None:
+    """Raise :class:`InvalidSettings` for a study that the tables of simulated users do not fit."""
+    check_actions(study)
     if study.awareness.window != 1 or study.awareness.threshold == 0:
         raise InvalidSettings("simulating many runs at once needs awareness.window 1 and awareness.threshold above 0")

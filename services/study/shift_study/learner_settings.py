@@ -51,8 +51,8 @@ class _PriorStrength(LearnerChoice):
 class _PriorTable(LearnerChoice):
     prior: dict[str, dict[str, Probability]] | None = Field(
         default=None,
-        description="Shares of strategies by cognitive state, in place of the scoring prior; or the name of a JSON file "
-        "beside the study file, as whatif writes it (wizard.json).",
+        description="Shares of strategies by cognitive state, in place of the scoring prior; or the name of a JSON "
+        "file beside the study file, as whatif writes it (wizard.json).",
     )
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +10,7 @@ from typing import Any
 from shift_recording.checksum import sha256_of
 from shift_recording.gaze_quality import GazeQuality, SourceQuality
 from shift_recording.mcap.reader import Recording
+from shift_recording.parallel import for_each
 from shift_schemas.errors import ShiftError
 from shift_schemas.messages import Gaze, Session
 
@@ -62,12 +61,6 @@ def report_on(path: Path, on_progress: Callable[[int, int], None] | None = None)
     )  # fmt: skip
 
 
-def report_on_many(paths: Iterable[Path], workers: int) -> Iterator[RecordingReport]:
-    """Yield the reports in the order of the paths, from so many processes at once."""
-    paths = tuple(paths)
-    if workers == 1 or len(paths) == 1:
-        yield from map(report_on, paths)
-        return
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(paths)), mp_context=spawn) as pool:
-        yield from pool.map(report_on, paths)
+def report_on_many(paths: Iterable[Path], workers: int = 0, scheduler: str = "") -> Iterator[RecordingReport]:
+    """Yield the reports in the order of the paths; :func:`for_each` has the parameters."""
+    yield from for_each(report_on, tuple(paths), workers, scheduler)
