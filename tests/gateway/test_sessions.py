@@ -40,6 +40,31 @@ async def test_defaults_are_a_new_id_the_default_study_and_a_seed_of_the_id(mesh
         assert answer["seed"] == int.from_bytes(digest[:6], "big"), "a restart gives the same"
 
 
+async def test_covariates_are_kept_as_text(mesh: Mesh) -> None:
+    given = {"age": 31, "group": "a", "height_m": 1.62, "left_handed": True}
+    body = {"participant": "P01", "session": "people", "covariates": given}
+    answer = await mesh.ask("POST", "/v1/sessions", body)
+    assert answer.status_code == 201
+    expected = {"age": "31", "group": "a", "height_m": "1.62", "left_handed": "true"}
+    assert answer.json()["covariates"] == expected
+    assert (await mesh.ask("GET", "/v1/sessions/people")).json()["covariates"] == expected
+    assert (await mesh.ask("POST", "/v1/sessions", body)).status_code == 200
+    assert (await mesh.ask("POST", "/v1/sessions", body | {"covariates": {"age": 32}})).status_code == 409
+
+
+@pytest.mark.parametrize(
+    ("covariates", "says"),
+    [({"participant": "P02"}, "is a column of the exported table already"), ({"a b": "x"}, "covariates"),
+     ({"age": None}, "age"), ({"age": {"years": 31}}, "age"), ({"note": "x" * 201}, "200"),
+     ({f"c{i}": "x" for i in range(33)}, "32")],
+    ids=lambda value: str(value)[:20],
+)  # fmt: skip
+async def test_wrong_covariates_are_refused(mesh: Mesh, covariates: dict[str, Any], says: str) -> None:
+    answer = await mesh.ask("POST", "/v1/sessions", {"participant": "P01", "covariates": covariates})
+    assert answer.status_code == 422
+    assert says in answer.text
+
+
 async def test_repeated_start_gets_the_first_result(mesh: Mesh) -> None:
     body = {"participant": "P01", "session": "again", "study": STUDY}
     first = await mesh.ask("POST", "/v1/sessions", body)

@@ -62,6 +62,7 @@ class Session:
         seed: int = 1,
         recording_format: int = FORMAT,
         steady: bool = False,
+        covariates: dict[str, str] | None = None,
     ) -> None:
         self.rng = random.Random(seed)
         self.now_ns = START
@@ -76,8 +77,9 @@ class Session:
         self.chunks = 0
         given = {"study": "test", "tasks": ["a", "b"], **(study or {})}
         start = StartSession(
-            command_id="start", session="s1", participant="P01", seed=7, study=given, format=recording_format
-        )
+            command_id="start", session="s1", participant="P01", seed=7, study=given, format=recording_format,
+            covariates=covariates or {},
+        )  # fmt: skip
         self.do("recorder", start)
 
     def do(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Any, ClassVar
 
-from pydantic import AfterValidator, Field, RootModel
+from pydantic import AfterValidator, BeforeValidator, Field, RootModel
 
 from shift_schemas.ids import Id
 from shift_schemas.messages.base import (
@@ -33,6 +34,21 @@ time, or where somebody needs it. 5: an overridden decision records what SHIFT w
 """
 
 
+MOST_COVARIATES = 32
+
+
+def _covariate_text(value: object) -> object:
+    """Return a number or a truth value as JSON writes it; everything else stays."""
+    return json.dumps(value) if isinstance(value, bool | int | float) else value
+
+
+CovariateText = Annotated[str, Field(max_length=200)]
+Covariate = Annotated[
+    CovariateText, BeforeValidator(_covariate_text, json_schema_input_type=CovariateText | float | bool)
+]
+"""A text, a number or a truth value, kept as text."""
+
+
 class Session(Fact):
     """A session began, is ending or ended."""
 
@@ -53,8 +69,9 @@ class Session(Fact):
     software: str = Field(default="", description="Version of shift-mesh.")
     revision: str = Field(default="", description="Git revision of shift-mesh, where known.")
     shard: str = Field(default="", description="The shard of a mesh with several, such as 0/4; it never changes.")
-    format: Count = Field(default=1, description="Which facts and fields the session records; today 4.")
+    format: Count = Field(default=1, description="Which facts and fields the session records; today 5.")
     warnings: Warnings = Field(default=[], description="What was accepted at its start but may be a mistake.")
+    covariates: dict[Id, CovariateText] = Field(default={}, description="What was given about the participant.")
 
 
 class Config(Fact):
@@ -82,6 +99,16 @@ class Marker(Fact):
     author: Author = Field(default="", description="Who set it, if the name was given.")
 
 
+RESERVED = frozenset(Session.model_fields) | {"file", "complete", "incomplete_reason", "duration_s"}
+"""The columns of the exported table of sessions; a covariate must not take their places."""
+
+
+def _check_names(covariates: dict[str, str]) -> dict[str, str]:
+    if taken := [name for name in covariates if name in RESERVED]:
+        raise ValueError(f"{taken[0]} is a column of the exported table already; choose another name")
+    return covariates
+
+
 START_ID, END_ID = "start", "end"
 """Start and end have fixed ids: a session has one of each, and a repeat gets the first result."""
 
@@ -98,12 +125,16 @@ class StartSession(Command):
     wording = RepeatWording("session {session} is there already", "start", "Choose another session id")
     internal = frozenset({"replay_of", "software", "revision", "shard", "format", "warnings"})
     not_content = frozenset({"need", "command_id", "shard", "format", "warnings"})
+    added = frozenset({"covariates"})
 
     participant: Id = Field(description="Pseudonym of the participant.")
     session: Id = Field(description="Left out: a new id.")
     study: Id | JsonObject = Field(default="default", description="A study's name, or the study itself.")
     seed: Annotated[int, Field(ge=0, lt=2**53)] | None = Field(default=None, description="Left out: from the id.")
     condition: Id | None = Field(default=None, description="Left out: the study's own values.")
+    covariates: Annotated[dict[Id, Covariate], Field(max_length=MOST_COVARIATES), AfterValidator(_check_names)] = Field(
+        default={}, description="What is known of the participant, such as age and group; columns of exported tables."
+    )
     replay_of: str = ""
     software: str = ""
     revision: str = ""

@@ -122,7 +122,7 @@ def _start(state: RecorderState | None, command: StartSession, now: Stamp) -> St
         condition=command.condition, seed=seed_of(command.session) if command.seed is None else command.seed,
         state=LIVE, started=now, replay_of=command.replay_of,
         software=command.software, revision=command.revision, shard=command.shard, format=command.format,
-        warnings=_start_warnings(study, command),
+        warnings=_start_warnings(study, command), covariates=command.covariates,
     )  # fmt: skip
     config = Config(session=command.session, stamp=now, version=1, study=study_json(in_force))
     original = shared(json.dumps(study_data(study), ensure_ascii=False))

@@ -137,7 +137,7 @@ def _start_of(start: Session, study: dict[str, Any]) -> StartSession:
     return StartSession(
         command_id=START_ID, session=start.session, participant=start.participant, study=study, seed=start.seed,
         condition=start.condition, replay_of=start.replay_of, software=start.software, revision=start.revision,
-        shard=start.shard, format=start.format,
+        shard=start.shard, format=start.format, covariates=start.covariates,
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from shift_recording.mcap.reader import facts
 from shift_schemas.errors import DamagedRecording, InvalidSettings, MalformedMessage, UnknownThing
 from shift_schemas.messages import Decision, Gaze, Performance
 from shift_schemas.timestamps import Stamp
+from shift_verify.verify import verify
 from support.verify_sessions import Session
 
 TABLES = ("sessions", "gaze", "fixations", "observations", "estimates", "decisions", "performances", "transitions",
@@ -41,6 +42,21 @@ def covariates(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("people") / "people.csv"
     path.write_text("participant,age,group\nP01,34,A\nP02,28,B\n", encoding="utf-8")
     return path
+
+
+def test_covariates_of_the_start_are_columns_and_the_file_stands_in_their_place(tmp_path: Path) -> None:
+    given = {"age": "31", "handedness": "left"}
+    path = Session(seed=4, covariates=given).interactions(3).ended().finished(tmp_path)
+    assert verify(path).ok
+    (row,) = read_csv(export([path], "csv", tmp_path / "a").files[0].parent / "sessions.csv")
+    assert (row["age"], row["handedness"]) == ("31", "left")
+    people = tmp_path / "people.csv"
+    people.write_text("participant,age\nP01,32\n", encoding="utf-8")
+    export([path], "csv", tmp_path / "b", covariates=people)
+    (row,) = read_csv(tmp_path / "b" / "sessions.csv")
+    assert (row["age"], row["handedness"]) == ("32", "left")
+    export([path], "bids", tmp_path / "c", screen=SCREEN)
+    assert "31\tleft" in (tmp_path / "c" / "participants.tsv").read_text()
 
 
 def read_csv(path: Path) -> list[dict[str, str]]:

@@ -46,6 +46,7 @@ class Names:
     aois: dict[str, None] = field(default_factory=dict)
     strategies: dict[str, None] = field(default_factory=dict)
     tasks: dict[str, None] = field(default_factory=dict)
+    covariates: dict[str, None] = field(default_factory=dict)
     actions: int = 0
     """The largest number of actions in a decision."""
 

@@ -14,7 +14,7 @@ from shift_schemas.messages import Session
 from shift_recording.durable_file import make_folder, write_durably
 from shift_recording.export.bids import BidsSession, Labels, Screen, write_data_set
 from shift_recording.export.dictionary import dictionary_csv
-from shift_recording.export.sources import OnProgress, Report, Sources, open_sources
+from shift_recording.export.sources import OnProgress, Report, Sources, covariates_of, open_sources
 from shift_recording.export.tables import Row, table_columns
 from shift_recording.export.vowpal_wabbit import line_of
 
@@ -125,7 +125,7 @@ class _DataSet:
         """Return the folder of a session, and note whose it is."""
         subject = self._labels["participant"].of(session.participant)
         name, study = self._labels["session"].of(session.session), self._labels["study"].of(session.study)
-        given = self._covariates.get(session.participant, {})
+        given = covariates_of(session, self._covariates)
         self.people[subject] = {"participant_id": f"sub-{subject}", "pseudonym": session.participant, **given}
         named = {"session_id": f"ses-{name}", "session": session.session, "file": file}
         self.sessions.setdefault(subject, []).append(named)

@@ -55,8 +55,7 @@ class OneRecording:
             self._report.damaged[name] = e.detail
         whole = recording.report.complete and name not in self._report.damaged
         reason = "" if whole else self._report.damaged.get(name, recording.report.reason)
-        given = self._covariates.get(str(self.rows.keys()["participant"]), {})
-        yield from self.rows.rest(whole, reason, given)
+        yield from self.rows.rest(whole, reason, covariates_of(self.rows.session, self._covariates))
 
 
 @dataclass(frozen=True)
@@ -70,8 +69,9 @@ class Sources:
 
     @property
     def covariate_names(self) -> tuple[str, ...]:
-        """The names of the covariates, in the order of their file."""
-        return tuple(dict.fromkeys(name for given in self.covariates.values() for name in given))
+        """The names of the covariates: those of the sessions, then those of the file."""
+        named = (name for given in self.covariates.values() for name in given)
+        return tuple(dict.fromkeys((*self.names.covariates, *named)))
 
     def recordings(self, on_progress: OnProgress | None = None) -> Iterator[OneRecording]:
         """Yield the recordings one after the other."""
@@ -95,6 +95,13 @@ def first_session(path: Path) -> Session | None:
         assert isinstance(recorded.fact, Session)
         return recorded.fact
     return None
+
+
+def covariates_of(session: Session | None, given: Mapping[str, Mapping[str, str]]) -> dict[str, str]:
+    """Return the covariates of a session: those of its start, in whose place those of the file stand."""
+    if session is None:
+        return {}
+    return {**session.covariates, **given.get(session.participant, {})}
 
 
 def read_covariates(path: Path | None) -> dict[str, dict[str, str]]:
@@ -125,8 +132,10 @@ def read_covariates(path: Path | None) -> dict[str, dict[str, str]]:
     return found
 
 
-def _check_session(path: Path, known: dict[str, str]) -> None:
+def _check_session(path: Path, known: dict[str, str], names: Names) -> None:
+    """Note the names of the covariates. Raise :class:`MalformedMessage` if another file has the same session."""
     session = first_session(path)
+    names.covariates |= dict.fromkeys(session.covariates if session is not None else ())
     if session is not None and (other := known.setdefault(session.session, str(path))) != str(path):
         raise MalformedMessage(
             f"{other} and {path} are both recordings of session {session.session}, so their rows could not be told "
@@ -150,7 +159,7 @@ def open_sources(paths: Iterable[Path], covariates: Path | None, with_excluded: 
         try:
             excluded = read_exclusion(path).in_force
             if excluded is None or with_excluded:
-                _check_session(path, session_files)
+                _check_session(path, session_files, names)
                 names_in((recorded.fact for recorded in Recording(path).facts(("config", "decision"))), names)
         except DamagedRecording as e:
             report.damaged[path.name] = e.detail

@@ -97,7 +97,11 @@ def names_in(facts: Iterable[Fact], names: Names) -> None:
 def table_columns(names: Names, covariates: Iterable[str] = ()) -> dict[str, tuple[Column, ...]]:
     """Return the columns of each table."""
     given = [Column(name, "text", "A covariate of the participant, as given.", "covariates") for name in covariates]
-    about = [c for c in columns_of(Session, names, "session") if c.name not in ("participant", "condition", "counts")]
+    about = [
+        c
+        for c in columns_of(Session, names, "session")
+        if c.name not in ("participant", "condition", "counts", "covariates")
+    ]
     found = {"sessions": (*KEYS, *given, *ABOUT_FILE, *about), "gaze": (*KEYS, *GAZE)}
     for table, kind in TABLES.items():
         if table != "gaze":
@@ -179,7 +183,7 @@ class RecordingRows:
         first, last = self.session, self._last
         if first is None or last is None:
             return
-        values = {n: v for n, v in values_of(last).items() if not n.startswith("counts")}
+        values = {n: v for n, v in values_of(last).items() if not n.startswith(("counts", "covariates"))}
         values |= {"stamp_utc": first.stamp.ns, "warnings": " | ".join(first.warnings)}
         duration = (last.ended.ns - last.started.ns) / NS if last.ended is not None else None
         about = {"file": self.file, "complete": complete, "incomplete_reason": reason, "duration_s": duration}
