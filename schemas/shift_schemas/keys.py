@@ -5,6 +5,7 @@
 ``shift/v1/{session}/in/{stream}``          a stream into a service
 ``shift/v1/{session}/rpc/{procedure}``      a command
 ``shift/v1/@service/{service}/{endpoint}``  an endpoint of a service itself: outbox, health, metrics, alive
+``shift/v1/@replay/{session}``              the status of a replay, and the endpoint that controls it
 ==========================================  =====================================================================
 """
 
@@ -56,7 +57,17 @@ class ServiceKey:
     endpoint: str
 
 
-Key = FactKey | StreamKey | CommandKey | ServiceKey
+@dataclass(frozen=True)
+class ReplayKey:
+    """The key of a replay: its status is published there, and requests control it."""
+
+    session: str
+
+
+Key = FactKey | StreamKey | CommandKey | ServiceKey | ReplayKey
+
+EVERY_REPLAY = f"{ROOT}/@replay/*"
+"""Matches the key of every replay."""
 
 
 @lru_cache(maxsize=CACHED_KEYS)
@@ -71,6 +82,8 @@ def build_key(key: Key) -> str:
             return f"{ROOT}/{_id(session)}/rpc/{_known(procedure, PROCEDURE_OWNER)}"
         case ServiceKey(service, endpoint):
             return f"{ROOT}/@service/{_known(service, SERVICES)}/{_known(endpoint, ENDPOINTS)}"
+        case ReplayKey(session):
+            return f"{ROOT}/@replay/{_id(session)}"
 
 
 @lru_cache(maxsize=CACHED_KEYS)
@@ -81,6 +94,8 @@ def parse_key(text: str) -> Key:
         match parts[2:]:
             case ["@service", service, endpoint]:
                 return ServiceKey(_known(service, SERVICES), _known(endpoint, ENDPOINTS))
+            case ["@replay", session]:
+                return ReplayKey(_id(session))
             case [session, subject]:
                 return FactKey(_id(session), _known(subject, OWNER_OF))
             case [session, "in", stream]:

@@ -84,6 +84,60 @@ def test_topics_and_offset_leave_out_the_rest(recording: Path) -> None:
     assert [i.attachment for i in heard] == [f"replay:{m.sequence}".encode() for m in later]
 
 
+def test_duration_leaves_out_the_rest(recording: Path) -> None:
+    whole = [i for _, i in _run(Replay(recording, "again", 1000.0))]
+    middle = extent_of(recording).length_s / 2
+    part = [i for _, i in _run(Replay(recording, "again", 1000.0, duration_s=middle))]
+    assert 0 < len(part) < len(whole)
+    assert [i.payload for i in part] == [i.payload for i in whole[: len(part)]]
+
+
+def test_topics_get_other_names(recording: Path) -> None:
+    async def keys() -> set[str]:
+        heard: set[str] = set()
+        replay = Replay(
+            recording, "again", 1000.0, topics=("decision", "policy"), remap={"decision": "decision_before"}
+        )
+        pacer = Pacer(replay.rate, asyncio.get_running_loop().time)
+        await play(lambda key, payload, **_: heard.add(key), replay, extent_of(recording), pacer)  # type: ignore[misc]
+        return heard
+
+    assert asyncio.run(keys()) == {"shift/v1/again/decision_before", "shift/v1/again/policy"}
+
+
+def test_step_lets_one_message_pass_and_a_jump_goes_back(recording: Path) -> None:
+    async def run() -> None:
+        loop = asyncio.get_running_loop()
+        positions: list[float] = []
+        replay, extent = Replay(recording, "again", 1.0), extent_of(recording)
+        pacer = Pacer(1.0, loop.time, paused=True)
+        playing = asyncio.create_task(
+            play(lambda *a, **k: None, replay, extent, pacer, lambda at, _: positions.append(at))
+        )
+        for count in (1, 2, 3):
+            pacer.step()
+            await asyncio.sleep(0.02)
+            assert len(positions) == count
+        late = extent.length_s * 0.8
+        pacer.jump(late)
+        pacer.step()
+        await asyncio.sleep(0.05)
+        assert len(positions) == 4
+        assert positions[-1] >= late
+        pacer.jump(0.0)
+        pacer.step()
+        await asyncio.sleep(0.05)
+        assert positions[-1] == positions[0]
+        assert pacer.paused
+        pacer.change_rate(1000.0)
+        pacer.pause(False)
+        await asyncio.wait_for(playing, 5)
+        whole = len(list(Recording(recording).messages()))
+        assert len(positions) == 4 + whole
+
+    asyncio.run(run())
+
+
 def test_a_loop_begins_again_until_it_is_cancelled(recording: Path) -> None:
     async def run() -> int:
         counted = [0]

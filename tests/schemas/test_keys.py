@@ -9,6 +9,7 @@ from shift_schemas.keys import (
     CommandKey,
     FactKey,
     Key,
+    ReplayKey,
     ServiceKey,
     StreamKey,
     build_key,
@@ -26,10 +27,27 @@ keys = (
     st.builds(FactKey, ids, st.sampled_from(SUBJECTS))
     | st.builds(StreamKey, ids, st.sampled_from(sorted(STREAMS)))
     | st.builds(CommandKey, ids, st.sampled_from(sorted(PROCEDURE_OWNER)))
+    | st.builds(ReplayKey, ids)
     | st.builds(ServiceKey, st.sampled_from(SERVICES), st.sampled_from(ENDPOINTS))
 )
 parts = ids | st.sampled_from(
-    ["shift", "v1", "v2", "@service", "in", "rpc", "gaze", "decide", "decider", "outbox", "*", "**", "", "decision"]
+    [
+        "shift",
+        "v1",
+        "v2",
+        "@service",
+        "@replay",
+        "in",
+        "rpc",
+        "gaze",
+        "decide",
+        "decider",
+        "outbox",
+        "*",
+        "**",
+        "",
+        "decision",
+    ]
 )
 
 

@@ -37,7 +37,15 @@ from shift_schemas.messages.learner import (
     ScoredResult,
     Transition,
 )
-from shift_schemas.messages.mesh import Answer, Health, OutboxPage, OutboxQuery, OutboxRow
+from shift_schemas.messages.mesh import (
+    Answer,
+    Health,
+    OutboxPage,
+    OutboxQuery,
+    OutboxRow,
+    ReplayControl,
+    ReplayStatus,
+)
 from shift_schemas.messages.monitor import AwarenessView, CapacityView, Fixation, Gaze, GazeChunk, GazeView, Observation
 from shift_schemas.messages.recorder import (
     END_ID,
@@ -92,6 +100,8 @@ __all__ = [
     "Policy",
     "PolicyRow",
     "RepeatWording",
+    "ReplayControl",
+    "ReplayStatus",
     "ReportPerformance",
     "RestRoute",
     "Result",

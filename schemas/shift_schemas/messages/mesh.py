@@ -62,3 +62,28 @@ class Health(Message):
     mesh: str = Field(default="", description="Id of its data folder; it tells two services of the same name apart.")
     since: Stamp | None = Field(default=None, description="When its process began.")
     data: str = Field(default="", description="Its data folder.")
+
+
+class ReplayStatus(Message):
+    """How far a replay is; it is published while the replay runs."""
+
+    session: Id = Field(description="The session under which the recording is replayed.")
+    recording: str = Field(description="The file.")
+    inputs: bool = Field(default=False, description="Only inputs are replayed, and the mesh decides anew.")
+    position_s: float = Field(description="Position on the recording's time line, s.")
+    length_s: float = Field(description="Its length, s.")
+    rate: float = Field(description="Recorded seconds in a second.")
+    paused: bool
+    published: Count = Field(description="How many messages were replayed.")
+
+
+class ReplayControl(Message):
+    """What a replay is to do; what is left out stays as it is."""
+
+    paused: bool | None = Field(default=None, description="Pause or continue.")
+    rate: Annotated[float, Field(gt=0, le=10_000)] | None = Field(
+        default=None, description="Recorded seconds a second."
+    )
+    position_s: Annotated[float, Field(ge=0, le=1e9)] | None = Field(default=None, description="Go on from here, s.")
+    step: bool = Field(default=False, description="Pause, and replay one more message.")
+    stop: bool = Field(default=False, description="End the replay.")

@@ -21,6 +21,7 @@ from shift_gateway.paths import GatewayApp
 from shift_gateway.problems import PROBLEM_RESPONSE, BodyLimit, problem_response
 from shift_gateway.read_paths import add_reads
 from shift_gateway.recordings import add_recordings
+from shift_gateway.replay_paths import add_replays
 from shift_gateway.settings import GatewaySettings
 from shift_gateway.studies import add_studies
 from shift_gateway.web.late_mount import PageRoute
@@ -50,7 +51,7 @@ def make_app(settings: GatewaySettings, open_buses: Opener, clock: Clock) -> Fas
     )
     app.add_middleware(BodyLimit)
     app.add_exception_handler(ShiftError, _on_shift_error)
-    for add in (add_commands, add_gaze, add_reads, add_events, add_recordings, add_operations):
+    for add in (add_commands, add_gaze, add_reads, add_events, add_recordings, add_replays, add_operations):
         add(app, gateway)
     add_studies(app, settings.data / "studies")
     add_docs(app)

@@ -8,9 +8,10 @@ So every tool that listens receives a replay, and no learner learns from it.
 from __future__ import annotations
 
 import asyncio
+import math
 import secrets
-from collections.abc import AsyncIterator, Callable, Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -59,6 +60,10 @@ class Replay:
     loop: bool = False
     longest_pause_s: float = LONGEST_PAUSE_S
     """A longer pause of the recording is shortened to this; 0: none is."""
+    duration_s: float = 0.0
+    """How much of the recording is replayed from the offset on, s; 0: all of it."""
+    remap: Mapping[str, str] = field(default_factory=dict)
+    """Topics that are published under the key of another topic's name, or under a new name."""
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -68,9 +73,13 @@ class Replay:
             raise MalformedMessage(f"a speed of {self.rate:g} is not valid; write a number above 0, 1 for real time")
         if not 0 <= self.start_offset_s < 1e9:
             raise MalformedMessage(f"a start {self.start_offset_s:g} s into the recording cannot be")
+        if not 0 <= self.duration_s < 1e9:
+            raise MalformedMessage(f"a duration of {self.duration_s:g} s is not valid; write 0 for the whole recording")
+        if wrong := [name for name in self.remap.values() if not is_id(name)]:
+            raise MalformedMessage(f"--remap: {not_an_id(wrong[0])}")
         if not 0 <= self.longest_pause_s < 1e9:
             raise MalformedMessage(f"a longest pause of {self.longest_pause_s:g} s is not valid; write 0 for no limit")
-        if unknown := [topic for topic in self.topics if topic not in SUBJECTS]:
+        if unknown := [topic for topic in (*self.topics, *self.remap) if topic not in SUBJECTS]:
             known = f"there are {', '.join(SUBJECTS)}{did_you_mean(unknown[0], SUBJECTS)}"
             raise MalformedMessage(f"{shorten(unknown[0])!r} is not a topic; {known}")
 
@@ -126,6 +135,13 @@ class Pacer:
         self._at = 0.0
         self._since: float | None = None if paused else now()
         self._changed = asyncio.Event()
+        self._jump: float | None = None
+        self._steps = 0
+
+    @property
+    def rate(self) -> float:
+        """Recorded seconds in a second."""
+        return self._rate
 
     @property
     def paused(self) -> bool:
@@ -142,6 +158,33 @@ class Pacer:
         self._at, self._since = self.position_s, (self._now() if self.paused else None)
         self._changed.set()
 
+    def pause(self, paused: bool) -> None:
+        """Pause or continue; nothing happens if it is so already."""
+        if paused != self.paused:
+            self.toggle()
+
+    def step(self) -> None:
+        """Pause, and let one more message pass."""
+        self.pause(True)
+        self._steps += 1
+        self._changed.set()
+
+    def jump(self, position_s: float) -> None:
+        """Ask the player to go on from another position of the recording, which can be earlier."""
+        self._jump = position_s
+        self.seek(position_s)
+
+    @property
+    def is_jumping(self) -> bool:
+        """Whether the player was asked to go on from another position."""
+        return self._jump is not None
+
+    def take_jump(self) -> float:
+        """Return the position to go on from; the request is then carried out."""
+        assert self._jump is not None
+        position_s, self._jump = self._jump, None
+        return position_s
+
     def seek(self, position_s: float) -> None:
         """Go to another position; a paused clock stays paused."""
         self._at, self._since = position_s, (None if self.paused else self._now())
@@ -153,8 +196,12 @@ class Pacer:
         self._rate = rate
 
     async def until(self, position_s: float) -> None:
-        """Wait until the position is reached."""
-        while (left_s := position_s - self.position_s) > 0 or self.paused:
+        """Wait until the position is reached, until a step lets one message pass, or until a jump is asked for."""
+        while not self.is_jumping and ((left_s := position_s - self.position_s) > 0 or self.paused):
+            if self._steps:
+                self._steps -= 1
+                self._at = max(self._at, position_s)
+                return
             self._changed.clear()
             wait = self._changed.wait()
             if self.paused:
@@ -220,37 +267,54 @@ async def play(
 
 async def _timed(replay: Replay, extent: Extent, pacer: Pacer) -> AsyncIterator[tuple[float, RecordedFact]]:
     """Yield each fact at its time."""
+    start_s = replay.start_offset_s
     while True:
-        pacer.seek(replay.start_offset_s)
+        pacer.seek(start_s)
         count = 0
-        for position_s, recorded in _from_offset(replay):
+        for position_s, recorded in _from_offset(replay, start_s):
             await pacer.until(position_s)
+            if pacer.is_jumping:
+                break
             count += 1
             yield position_s, recorded
             if count % 256 == 0:
                 await asyncio.sleep(0)
-        if not replay.loop or not count:
-            return
-        await pacer.until(extent.length_s)
-        await asyncio.sleep(0)
+        if not pacer.is_jumping:
+            if not replay.loop or not count:
+                return
+            await pacer.until(min(extent.length_s, _end_s(replay)))
+            await asyncio.sleep(0)
+        start_s = pacer.take_jump() if pacer.is_jumping else replay.start_offset_s
 
 
-def _from_offset(replay: Replay) -> Iterator[tuple[float, RecordedFact]]:
+def _end_s(replay: Replay) -> float:
+    return replay.start_offset_s + replay.duration_s if replay.duration_s else math.inf
+
+
+def _from_offset(replay: Replay, start_s: float) -> Iterator[tuple[float, RecordedFact]]:
     line = TimeLine(replay.longest_pause_s)
     for message in Recording(replay.path).messages():
         position_s = line.position_s(message.log_time)
-        if position_s >= replay.start_offset_s and message.topic in replay.topics:
+        if position_s > _end_s(replay):
+            return
+        if position_s >= start_s and message.topic in replay.topics:
             yield position_s, recorded_fact(replay.path, message)
 
 
 def _publish(put: Publish, replay: Replay, recorded: RecordedFact) -> None:
     fact = replayed(recorded.fact, replay)
     put(
-        build_key(FactKey(replay.session, fact.subject)),
+        key_of(replay, fact.subject),
         encode(fact),
         encoding=encoding_of(type(fact)),
         attachment=REPLAY_MARK + str(recorded.sequence).encode(),
     )
+
+
+def key_of(replay: Replay, subject: str) -> str:
+    """Return the key under which the facts of a subject are published."""
+    key = build_key(FactKey(replay.session, subject))
+    return f"{key.rpartition('/')[0]}/{replay.remap[subject]}" if subject in replay.remap else key
 
 
 def replayed(fact: Fact, replay: Replay) -> Fact:

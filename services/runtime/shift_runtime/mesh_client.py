@@ -10,9 +10,9 @@ import asyncio
 from collections.abc import Sequence
 
 from shift_schemas.codec import M, decode, encode
-from shift_schemas.errors import MalformedMessage, Problem, Unavailable
-from shift_schemas.keys import CommandKey, ServiceKey, StreamKey, build_key
-from shift_schemas.messages import Answer, Command, GazeChunk, Health
+from shift_schemas.errors import MalformedMessage, Problem, Unavailable, UnknownThing
+from shift_schemas.keys import EVERY_REPLAY, CommandKey, ReplayKey, ServiceKey, StreamKey, build_key
+from shift_schemas.messages import Answer, Command, GazeChunk, Health, ReplayControl, ReplayStatus
 from shift_schemas.registry import OWNERS
 from shift_schemas.shards import Shard, shard_of
 
@@ -81,6 +81,32 @@ class MeshClient:
         asked = [first_answer(bus, key, timeout_s=timeout_s, read=_payload_of) for bus in self.buses]
         return [text for text in await asyncio.gather(*asked) if text]
 
+    async def replays(self, timeout_s: float = 1.0) -> list[ReplayStatus]:
+        """Return the status of each replay that runs."""
+        asked = [bus.get(EVERY_REPLAY, timeout_s=timeout_s) for bus in self.buses]
+        replies = [reply for found in await asyncio.gather(*asked) for reply in found if reply.ok]
+        found = [status for reply in replies if (status := _decoded(ReplayStatus, reply)) is not None]
+        return sorted(found, key=lambda status: status.session)
+
+    async def control_replay(self, session: str, control: ReplayControl | None = None) -> ReplayStatus:
+        """Control a replay and return its status after that; without a control only its status.
+
+        Raises
+        ------
+        UnknownThing
+            No such replay runs.
+        ShiftError
+            The replay refuses the control.
+        """
+        payload = encode(control) if control is not None else b""
+        bus, key = self.bus_of(session), build_key(ReplayKey(session))
+        answer = await first_answer(bus, key, payload, timeout_s=ATTEMPT_S, read=_replay_of)
+        if isinstance(answer, Problem):
+            raise answer.error()
+        if isinstance(answer, ReplayStatus):
+            return answer
+        raise UnknownThing(f"no replay runs under session {session}")
+
     def _worker(self, owner: str, index: int) -> str:
         return owner if len(self.buses) == 1 else f"{owner} {Shard(index, len(self.buses))}"
 
@@ -99,6 +125,10 @@ class MeshClient:
                 return answer
             await asyncio.sleep(PAUSE_S)
         raise Unavailable(f"the {owner} does not answer")
+
+
+def _replay_of(reply: Reply) -> ReplayStatus | Problem | None:
+    return _decoded(ReplayStatus, reply) if reply.ok else _decoded(Problem, reply)
 
 
 def _payload_of(reply: Reply) -> bytes | None:

@@ -16,6 +16,7 @@ from shift_gateway.recordings import recording_path
 from shift_gateway.web.layout import Frame, explain, show_error, testid, text
 from shift_gateway.web.recording_summary import WORK, RecordingSummary
 from shift_gateway.web.recordings_view import COLUMNS, NO_STATISTICS, recording_row
+from shift_gateway.web.replay_panel import ReplayPanel
 from shift_gateway.web.worker_process import WorkFailed, parts_of
 
 Key = tuple[str, int, int]
@@ -92,6 +93,7 @@ class RecordingsPage:
         with ui.element("div").classes("page"):
             text("Recordings", tag="h1")
             text(NO_STATISTICS, "muted", "no-statistics")
+            ReplayPanel(gateway)
             self._progress_text = text("", "muted", "reading").props('role="status"')
             self._progress = ui.linear_progress(0, show_value=False).props('aria-label="Recordings read"')
             self._progress.set_visibility(False)

@@ -80,7 +80,7 @@ class MemoryBus:
         """See :class:`~shift_runtime.bus.protocol.Bus`."""
         waiting = []
         for expression, handler in list(self._hub.servers):
-            if matches(expression, key):
+            if matches(expression, key) or matches(key, expression):
                 future: asyncio.Future[Reply] = asyncio.get_running_loop().create_future()
                 handler(_Request(key, payload, future))
                 waiting.append(future)
