@@ -13,6 +13,7 @@ from shift_schemas.errors import ShiftError
 from shift_gateway.command_paths import add_commands
 from shift_gateway.docs_page import add_docs
 from shift_gateway.event_stream import add_events
+from shift_gateway.foxglove.paths import add_foxglove
 from shift_gateway.gateway import Gateway
 from shift_gateway.gaze_paths import add_gaze
 from shift_gateway.operation_paths import add_operations
@@ -51,7 +52,16 @@ def make_app(settings: GatewaySettings, open_buses: Opener, clock: Clock) -> Fas
     )
     app.add_middleware(BodyLimit)
     app.add_exception_handler(ShiftError, _on_shift_error)
-    for add in (add_commands, add_gaze, add_reads, add_events, add_recordings, add_replays, add_operations):
+    for add in (
+        add_commands,
+        add_gaze,
+        add_reads,
+        add_events,
+        add_recordings,
+        add_replays,
+        add_operations,
+        add_foxglove,
+    ):
         add(app, gateway)
     add_studies(app, settings.data / "studies")
     add_docs(app)
