@@ -155,7 +155,12 @@ def test_inputs_follow_from_outputs_and_give_the_same_outputs(seed: int) -> None
             inputs.append(session("ending"))
         before = seen
     _, again = fold(None, *inputs)
-    assert [f.model_dump_json() for f in again] == [f.model_dump_json() for f in facts]
+    assert [_derivable(f) for f in again] == [_derivable(f) for f in facts]
+
+
+def _derivable(fact: Fact) -> str:
+    """Return a fact without what no other fact records: how many chunks were repeated and refused."""
+    return fact.model_dump_json(exclude={"repeated", "refused"})
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -10,10 +10,10 @@ import pytest
 from mcap.reader import make_reader
 from shift_recording import merging as finishing
 from shift_recording.checksum import Checksum, check
-from shift_recording.durable_file import StorageFailed
+from shift_recording.durable_file import DurableFile, StorageFailed
 from shift_recording.mcap.reader import Recording
 from shift_recording.merging import finish_recording
-from shift_schemas.errors import Conflict, UnknownThing
+from shift_schemas.errors import Conflict, DamagedRecording, UnknownThing
 from shift_schemas.registry import OWNER_OF
 from support.recordings import (
     ATTACHMENTS,
@@ -25,6 +25,7 @@ from support.recordings import (
     owner_sequences,
     write_segment,
 )
+from support.verify_sessions import Session
 
 
 def messages(path: Path) -> list[tuple[object, ...]]:
@@ -181,6 +182,27 @@ def test_a_crash_before_the_checksum_leaves_none_rather_than_a_wrong_one(
         finished(tmp_path, [write_segment(tmp_path / "s", interleaved(4))])
     assert check(tmp_path / "s1.mcap") is Checksum.MISSING
     assert len(messages(tmp_path / "s1.mcap")) == 12
+
+
+@pytest.mark.parametrize("spoil", ["cut", "flip"])
+def test_file_that_is_not_read_back_as_written_does_not_take_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spoil: str
+) -> None:
+    """A disk that loses or changes what was written is found before the end of a session is acknowledged."""
+    close = DurableFile.close
+
+    def spoilt(self: DurableFile) -> None:
+        close(self)
+        if self.path.name.endswith(".partial"):
+            data = bytearray(self.path.read_bytes())
+            data[len(data) // 2] ^= 0x10 if spoil == "flip" else 0
+            self.path.write_bytes(bytes(data) if spoil == "flip" else bytes(data[: len(data) // 2]))
+
+    monkeypatch.setattr(DurableFile, "close", spoilt)
+    with pytest.raises(DamagedRecording):
+        Session().interactions(5).ended().finished(tmp_path)
+    assert not (tmp_path / "s1.mcap").exists()
+    assert list(tmp_path.glob("**/0*.mcap")), "the segments are still there"
 
 
 def test_progress_is_told_to_the_end(tmp_path: Path) -> None:

@@ -157,6 +157,26 @@ def test_several_files_are_merged_by_log_time(tmp_path: Path) -> None:
     assert sorted(both) == sorted([*messages(first), *messages(second)])
 
 
+@pytest.mark.parametrize("size", [10_000, 32 * 2**20])
+def test_messages_are_sorted_in_bounded_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int) -> None:
+    monkeypatch.setattr("shift_recording.recovery.SORTED_BYTES", size)
+    rng = random.Random(5)
+    source = tmp_path / "shuffled.mcap"
+    times = [rng.randrange(10**9) for _ in range(500)]
+    with open(source, "wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("s", "", b"")
+        channel = writer.register_channel("/t", "json", schema)
+        for i, time in enumerate(times):
+            writer.add_message(channel, time, f"{i}".encode(), time)
+        writer.finish()
+    recover([source], tmp_path / "sorted.mcap", Wanted(sorted=True))
+    found = [(m[2], m[4]) for m in messages(tmp_path / "sorted.mcap")]
+    assert found == sorted((time, f"{i}".encode()) for i, time in enumerate(times))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["shuffled.mcap", "sorted.mcap", "sorted.mcap.sha256"]
+
+
 def test_nothing_is_overwritten(recording: Path, tmp_path: Path) -> None:
     with pytest.raises(Conflict, match="exists already"):
         recover([recording], recording)

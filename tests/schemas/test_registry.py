@@ -39,15 +39,15 @@ def test_each_fact_and_each_command_has_exactly_one_owner() -> None:
 
 def test_topics_are_in_the_contract_s_order() -> None:
     assert SUBJECTS == tuple(FACTS) == (
-        "session", "config", "gaze", "fixation", "observation", "estimate", "decision", "override", "performance",
-        "transition", "policy", "marker",
+        "session", "config", "gaze", "clock", "fixation", "observation", "estimate", "decision", "override",
+        "performance", "transition", "policy", "marker",
     )  # fmt: skip
 
 
 def test_tables_are_in_the_order_of_the_owners() -> None:
     assert OWNERS == {
         "recorder": ("session", "config", "marker"),
-        "monitor": ("gaze", "fixation", "observation"),
+        "monitor": ("gaze", "clock", "fixation", "observation"),
         "decider": ("estimate", "decision", "override"),
         "learner": ("performance", "transition", "policy"),
     }

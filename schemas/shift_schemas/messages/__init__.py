@@ -46,7 +46,16 @@ from shift_schemas.messages.mesh import (
     ReplayControl,
     ReplayStatus,
 )
-from shift_schemas.messages.monitor import AwarenessView, CapacityView, Fixation, Gaze, GazeChunk, GazeView, Observation
+from shift_schemas.messages.monitor import (
+    AwarenessView,
+    CapacityView,
+    Clock,
+    Fixation,
+    Gaze,
+    GazeChunk,
+    GazeView,
+    Observation,
+)
 from shift_schemas.messages.recorder import (
     END_ID,
     FORMAT,
@@ -70,6 +79,7 @@ __all__ = [
     "Answer",
     "AwarenessView",
     "CapacityView",
+    "Clock",
     "Command",
     "Config",
     "Configure",

@@ -30,6 +30,30 @@ class Gaze(Fact):
     warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake or has no effect.")
 
 
+class Clock(Fact):
+    """The ledger of a gaze source at the session's end: what came, what did not, and how its clock ran."""
+
+    owner = "monitor"
+    subject = "clock"
+
+    source: Id = Field(description="The gaze source.")
+    chunks: Count = Field(description="Chunks that were applied.")
+    samples: Count = Field(description="Samples that were applied.")
+    late: Count = Field(description="Chunks that came after a later one: recorded, not applied.")
+    missing: Count = Field(description="Chunks that never came, judged by their numbers.")
+    repeated: Count = Field(description="Chunks that were sent again with the same content; each counts once.")
+    refused: dict[str, Count] = Field(description="Chunks that the monitor refused, by the kind of the problem.")
+    restarts: Count = Field(description="How often the source's clock or numbering began anew.")
+    rate_hz: float | None = Field(default=None, description="Samples per second of the source's clock.")
+    longest_gap_s: float = Field(description="The longest time between two samples of a segment, s.")
+    offset_s: float | None = Field(
+        default=None, description="Mesh's clock minus source's clock, the smallest of the last segment, s."
+    )
+    drift_ppm: float | None = Field(
+        default=None, description="How much faster the source's clock ran, millionths; left out below 10 s."
+    )
+
+
 class Fixation(Fact):
     """A finished fixation, on the source's clock."""
 

@@ -36,6 +36,8 @@ def info(
         console = Console()
         console.print(_about(found))
         console.print(_counts(found))
+        if found.clocks:
+            console.print(_clocks(found))
     raise typer.Exit(1 if found.damaged or found.checksum == "differs" or not found.counts else 0)
 
 
@@ -68,4 +70,18 @@ def _counts(found: RecordingInfo) -> Table:
         table.add_row(escape(topic), f"{n}{samples}", "")
     for name, size in found.attachments.items():
         table.add_row(escape(name), "", f"{size:,}")
+    return table
+
+
+def _clocks(found: RecordingInfo) -> Table:
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table("gaze source", "chunks", "late", "missing", "repeated", "refused", "restarts", "rate", "drift")
+    for clock in found.clocks:
+        refused = ", ".join(f"{n} {kind}" for kind, n in clock["refused"].items()) or "0"
+        rate = "-" if clock["rate_hz"] is None else f"{clock['rate_hz']:.4g} Hz"
+        drift = "-" if clock["drift_ppm"] is None else f"{clock['drift_ppm']:+.0f} ppm"
+        counts = [str(clock[name]) for name in ("chunks", "late", "missing", "repeated")]
+        table.add_row(escape(clock["source"]), *counts, refused, str(clock["restarts"]), rate, drift)
     return table

@@ -44,6 +44,7 @@ def convert(
     end: Annotated[
         float | None, typer.Option(help="Up to so many seconds after the first message.", envvar="SHIFT_END")
     ] = None,
+    sort: Annotated[bool, typer.Option("--sort", help="Write them by their log time.", envvar="SHIFT_SORT")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
 ) -> None:
     """Write a part of one or several MCAP files to a new file; several are merged by their log time.
@@ -54,6 +55,7 @@ def convert(
     shift-mesh convert s1.mcap --out decisions.mcap --topics decision,performance
     shift-mesh convert s1.mcap --out minute.mcap --start 60 --end 120
     shift-mesh convert robot.mcap s1.mcap --out both.mcap
+    shift-mesh convert bag.mcap --out sorted.mcap --sort
     """
     from shift_recording.recovery import Wanted
     from shift_recording.recovery import recover as recover_file
@@ -62,7 +64,7 @@ def convert(
     if start is not None and end is not None and end < start:
         raise InvalidSettings(f"--end is {end:g} and --start is {start:g}: the end must not be before the start")
     names = tuple(name.strip() for name in topics.split(",") if name.strip())
-    _report(recover_file(files, out, Wanted(names or None, start, end)), as_json)
+    _report(recover_file(files, out, Wanted(names or None, start, end, sort)), as_json)
 
 
 def _report(found: list[Recovered], as_json: bool) -> None:

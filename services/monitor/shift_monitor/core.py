@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from shift_schemas.core_protocol import Step
-from shift_schemas.errors import UnknownThing
+from shift_schemas.errors import ShiftError, UnknownThing
 from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import Config, Decision, GazeChunk, Performance, Session
 from shift_schemas.timestamps import Stamp
@@ -22,14 +22,26 @@ from shift_schemas.timestamps import Stamp
 from shift_monitor.attention import initial_attention
 from shift_monitor.awareness import History, add_result, correct_result
 from shift_monitor.capacity import Capacity, apply_strategy
+from shift_monitor.clock_ledger import count_refused
 from shift_monitor.gaze_columns import gaze_chunk_of
 from shift_monitor.gaze_input import ChunkWithHistory
-from shift_monitor.gaze_step import close_stream, step_gaze
+from shift_monitor.gaze_step import MOST_SOURCES, close_stream, step_gaze
 from shift_monitor.prepared_study import prepare_study
-from shift_monitor.published import fixation_fact, observation_of, publish
-from shift_monitor.state import MonitorState, dump, initial, load, study_in_force
+from shift_monitor.published import clock_facts, fixation_fact, observation_of, publish
+from shift_monitor.state import MonitorState, dump, initial, load, study_in_force, with_ledger
 
-__all__ = ["MonitorState", "Show", "dump", "gaze_chunk_of", "held", "initial", "load", "observation_of", "step"]
+__all__ = [
+    "MonitorState",
+    "Show",
+    "dump",
+    "gaze_chunk_of",
+    "held",
+    "initial",
+    "load",
+    "observation_of",
+    "refused",
+    "step",
+]
 
 
 @dataclass(frozen=True)
@@ -93,7 +105,21 @@ def _on_session(state: MonitorState | None, event: Session, now: Stamp) -> Step[
     if not state.study:
         return Step(replace(state, ended=True))
     after, ended = close_stream(replace(state, ended=True))
-    return publish(after, now, tuple(fixation_fact(after, f, now) for f in ended))
+    fixations = tuple(fixation_fact(after, f, now) for f in ended)
+    return publish(after, now, (*fixations, *clock_facts(after, now)))
+
+
+def refused(state: MonitorState, message: object, error: ShiftError) -> MonitorState:
+    """Return the state after a request that was refused: a refused chunk of gaze is counted, unless it came too late.
+
+    What is counted reaches the recording with the ledger of its source, at the session's end.
+    """
+    chunk = message.chunk if isinstance(message, ChunkWithHistory) else message
+    if not isinstance(chunk, GazeChunk) or state.ended or not state.study:
+        return state
+    if chunk.source not in state.ledgers and len(state.ledgers) >= MOST_SOURCES:
+        return state
+    return replace(state, ledgers=with_ledger(state, chunk.source, lambda ledger: count_refused(ledger, error.kind)))
 
 
 def _on_config(state: MonitorState, event: Config) -> MonitorState:

@@ -22,6 +22,7 @@ from shift_monitor.chunk_sequence import (
     missing_chunks,
     sequence_from,
 )
+from shift_monitor.clock_ledger import count_applied, count_late, count_repeated
 from shift_monitor.fixation import finish
 from shift_monitor.gaze_account import end_segment
 from shift_monitor.gaze_checks import check_rise, check_samples
@@ -38,7 +39,7 @@ from shift_monitor.gaze_warnings import (
 )
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 from shift_monitor.published import SourcedFixation, fixation_fact, gaze_fact, gaze_result, is_due, publish
-from shift_monitor.state import MonitorState, study_in_force
+from shift_monitor.state import MonitorState, study_in_force, with_ledger
 
 MOST_SOURCES = 256
 """Chosen: the most gaze sources of one session; each is remembered, so that a former one can be refused."""
@@ -55,6 +56,8 @@ class Continuation(NamedTuple):
     ended: list[SourcedFixation]
     """The fixations that ended before the chunk."""
     warnings: list[str]
+    restarted: bool = False
+    """Whether the chunk begins another segment of its source."""
 
 
 def step_gaze(state: MonitorState, gaze: ChunkWithHistory, now: Stamp, timed_out: bool) -> Step[MonitorState]:
@@ -69,7 +72,8 @@ def step_gaze(state: MonitorState, gaze: ChunkWithHistory, now: Stamp, timed_out
     prepared = study_in_force(state, timed_out)
     if (first := find_repeated(gaze)) is not None:
         shown_in = state.version + state.held
-        return Step(state, result=gaze_result(chunk, first.accepted, shown_in, first.warnings), repeat=True)
+        after = replace(state, ledgers=with_ledger(state, chunk.source, count_repeated))
+        return Step(after, result=gaze_result(chunk, first.accepted, shown_in, first.warnings), repeat=True)
     _check_source(state, chunk)
     check_samples(chunk, prepared)
     times = [round(t * NS) for t in chunk.t]
@@ -144,7 +148,7 @@ def _begin_segment(state: MonitorState, stream: GazeStream, chunk: GazeChunk, ti
         sequence = sequence_from(chunk.seq)
     after = replace(state, restarts=state.restarts + 1)
     begun = GazeStream(stream.source, sequence, segment=segment, account=end_segment(stream.account))
-    return Continuation(after, begun, ended, [warning])
+    return Continuation(after, begun, ended, [warning], restarted=True)
 
 
 def _continue_stream(state: MonitorState, stream: GazeStream, chunk: GazeChunk) -> Continuation:
@@ -163,7 +167,7 @@ def _continue_stream(state: MonitorState, stream: GazeStream, chunk: GazeChunk) 
 def _record_late(state: MonitorState, stream: GazeStream, chunk: GazeChunk, now: Stamp) -> Step[MonitorState]:
     """Record a late chunk, which changes nothing of the model."""
     warnings = _recorded_warnings(state, [late_warning(chunk.seq, stream.numbering.last)])
-    after = replace(state, gaze_warnings=warnings)
+    after = replace(state, gaze_warnings=warnings, ledgers=with_ledger(state, chunk.source, count_late))
     facts = (gaze_fact(after, chunk, now, "late"),)
     return publish(after, now, facts, gaze_result(chunk, 0, after.version + 1, warnings))
 
@@ -172,7 +176,11 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
     """Apply a chunk to its stream; publish the chunk, the fixations that ended and the observation."""
     state, stream = onto.state, onto.stream
     prepared = prepare_study(state.study)
-    dropped = min(state.dropped + missing_chunks(stream.numbering, chunk.seq), LARGEST_COUNT)
+    missing = missing_chunks(stream.numbering, chunk.seq)
+    dropped = min(state.dropped + missing, LARGEST_COUNT)
+    ledgers = with_ledger(
+        state, chunk.source, lambda ledger: count_applied(ledger, times, missing, onto.restarted, now)
+    )
     jumps = jump_warnings(stream.last_ns, times[0])
     spacings = next_spacings(stream.spacings, stream.last_ns, times)
     stream = replace(stream, numbering=advance(stream.numbering, chunk.seq), spacings=spacings)
@@ -184,7 +192,7 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
     warnings = _recorded_warnings(state, [*onto.warnings, *jumps, *quality])
     after = replace(
         state, stream=stream, attention=attention, dropped=dropped, fixations=state.fixations + len(found),
-        samples=state.samples + len(times), received=now, gaze_warnings=warnings, held=True,
+        samples=state.samples + len(times), received=now, gaze_warnings=warnings, held=True, ledgers=ledgers,
     )  # fmt: skip
     ended = [*onto.ended, *((chunk.source, stream.segment, f) for f in found)]
     facts = (gaze_fact(after, chunk, now, "applied"), *(fixation_fact(after, f, now) for f in ended))

@@ -9,6 +9,7 @@ from shift_model.capacity import capacity_class
 from shift_schemas.core_protocol import Step
 from shift_schemas.messages import (
     CapacityView,
+    Clock,
     Fact,
     Fixation,
     Gaze,
@@ -23,6 +24,7 @@ from shift_schemas.timestamps import NS, Stamp
 from shift_monitor.areas import area_at
 from shift_monitor.attention import gaze_class
 from shift_monitor.awareness import awareness_views
+from shift_monitor.clock_ledger import clock_fact
 from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_account import EMPTY_ACCOUNT, shares
 from shift_monitor.gaze_columns import recorded_columns
@@ -113,6 +115,12 @@ def fixation_fact(state: MonitorState, ended: SourcedFixation, now: Stamp) -> Fi
         session=state.session, stamp=now, seen=_seen(state), source=source, segment=segment, start_s=start_ns / NS,
         duration_s=(end_ns - start_ns) / NS, x=x, y=y, aoi=name_of(prepared, area_at(prepared.areas, x, y)),
     )  # fmt: skip
+
+
+def clock_facts(state: MonitorState, now: Stamp) -> tuple[Clock, ...]:
+    """Return the ledgers of the sources as they are recorded, in the order of their first chunks."""
+    seen = _seen(state)
+    return tuple(clock_fact(state.session, seen, source, ledger, now) for source, ledger in state.ledgers.items())
 
 
 def gaze_result(chunk: GazeChunk, accepted: int, observation: int, warnings: tuple[str, ...]) -> dict[str, Any]:

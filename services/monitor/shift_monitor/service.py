@@ -29,5 +29,6 @@ CORE: Core[MonitorState] = Core(
     reads=READS["monitor"],
     prepare=prepared,
     held=core.held,
+    refused=core.refused,
     lookups={"gaze": ("source", "seq")},
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from shift_schemas.timestamps import Stamp
 from shift_monitor.attention import Attention
 from shift_monitor.awareness import History
 from shift_monitor.capacity import Capacity
+from shift_monitor.clock_ledger import EMPTY_LEDGER, ClockLedger
 from shift_monitor.gaze_stream import GazeStream
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 
@@ -67,6 +69,13 @@ class MonitorState:
     """What the last observation showed of gaze; None before the first one."""
     held: bool = False
     """Whether gaze was applied that no observation shows yet."""
+    ledgers: dict[str, ClockLedger] = field(default_factory=dict)
+    """The ledger of each source; a session before format 5 keeps none."""
+
+    @property
+    def keeps_ledgers(self) -> bool:
+        """Whether the session records the ledgers of its sources: from format 5 on."""
+        return self.format >= 5
 
 
 _STATE = TypeAdapter(MonitorState)
@@ -75,6 +84,15 @@ _STATE = TypeAdapter(MonitorState)
 def initial(event: Session) -> MonitorState:
     """Return the state at the start of a session, before its configuration."""
     return MonitorState(event.session, format=event.format)
+
+
+def with_ledger(
+    state: MonitorState, source: str, change: Callable[[ClockLedger], ClockLedger]
+) -> dict[str, ClockLedger]:
+    """Return the ledgers with one of them changed, if the session keeps any."""
+    if not state.keeps_ledgers:
+        return state.ledgers
+    return {**state.ledgers, source: change(state.ledgers.get(source, EMPTY_LEDGER))}
 
 
 def dump(state: MonitorState) -> str:

@@ -90,6 +90,8 @@ def finish_recording(
         A source does not exist.
     StorageFailed
         The disk refuses the write; ``target`` is unchanged.
+    DamagedRecording
+        The file is not read back as it was written; ``target`` is unchanged.
     """
     index = _indexed(session, sources)
     order, missing = _order(index)
@@ -106,6 +108,7 @@ def finish_recording(
             file.sync()
         finally:
             file.close()
+        _read_back(temporary, counts)
         sha256 = sha256_of(temporary)
         _put_in_place(temporary, target, sha256)
     finally:
@@ -240,6 +243,16 @@ class _Chunks:
             self._bytes -= len(self._kept.popitem(last=False)[1])
         self._kept[number] = content
         return content
+
+
+def _read_back(path: Path, counts: Mapping[str, int]) -> None:
+    """Read the written file. Raise :class:`DamagedRecording` unless it is whole and has as many messages as written."""
+    recording, found = Recording(path), dict.fromkeys(counts, 0)
+    for message in recording.messages():
+        found[message.topic] += 1
+    if not recording.report.complete or found != counts:
+        why = recording.report.reason or f"it has {sum(found.values())} messages instead of {sum(counts.values())}"
+        raise DamagedRecording(f"the recording was not written as it should be, and is kept in its segments: {why}")
 
 
 def _put_in_place(temporary: Path, target: Path, sha256: str) -> None:

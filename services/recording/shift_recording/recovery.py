@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import heapq
 import os
+import pickle
 import struct
 from collections.abc import Collection, Iterable, Iterator
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryFile
+from typing import IO, Any
 
 from mcap.writer import CompressionType, Writer
 from shift_schemas.errors import Conflict, DamagedRecording, UnknownThing
@@ -30,6 +32,12 @@ MOST_PROBLEMS = 20
 """So many problems of a file are named; the others are counted in the lost bytes alone."""
 
 
+SORTED_BYTES = 32 * 2**20
+"""So many bytes of messages are sorted in memory at once; chosen, as the reader's bound is 256 MB."""
+MESSAGE_OVERHEAD = 300
+"""What a message costs in memory beside its data, bytes."""
+
+
 @dataclass(frozen=True)
 class Wanted:
     """The messages to keep. Times are seconds from the first message's log time; None is no limit."""
@@ -37,6 +45,8 @@ class Wanted:
     topics: Collection[str] | None = None
     start_s: float | None = None
     end_s: float | None = None
+    sorted: bool = False
+    """Whether the messages are written in the order of their log times."""
 
     def keeps(self, topic: str, log_time: int, first: int) -> bool:
         """Return whether a message is kept; ``first`` is the log time of the first message, ns."""
@@ -216,7 +226,9 @@ def _channel_metadata(body: memoryview) -> dict[str, str]:
 class _Target:
     """The new file. Equal schemas and channels of several sources are written once."""
 
-    def __init__(self, file: DurableFile, profile: str) -> None:
+    def __init__(self, file: DurableFile, profile: str, folder: Path) -> None:
+        self.folder = folder
+        """Where temporary files may be made."""
         self._writer: Any = Writer(
             file,  # type: ignore[arg-type]  # it uses write, tell and flush only
             chunk_size=CHUNK_BYTES,
@@ -268,7 +280,8 @@ class _Target:
 def recover(paths: Iterable[Path], target: Path, wanted: Wanted = Wanted()) -> list[Recovered]:
     """Write what can be read of one or several files to ``target``, which appears when it is whole.
 
-    The messages of one file stay in their order; those of several files are merged by their log time.
+    The messages of one file stay in their order unless they are to be sorted; those of several files are merged by
+    their log time.
 
     Raises
     ------
@@ -290,7 +303,7 @@ def recover(paths: Iterable[Path], target: Path, wanted: Wanted = Wanted()) -> l
     part = target.with_name(f".{target.name}.part")
     part.unlink(missing_ok=True)
     with closing(DurableFile(part, new=True)) as file:
-        written = _Target(file, sources[0].profile)
+        written = _Target(file, sources[0].profile, target.parent)
         for source in sources:
             written.front(source)
         _copy(sources, written, wanted)
@@ -305,14 +318,40 @@ def recover(paths: Iterable[Path], target: Path, wanted: Wanted = Wanted()) -> l
 
 def _copy(sources: list[_Source], target: _Target, wanted: Wanted) -> None:
     first = min((source.first for source in sources if source.first is not None), default=0)
-    merged = heapq.merge(*(_numbered(i, source) for i, source in enumerate(sources))) if len(sources) > 1 else (
-        _numbered(0, sources[0])
-    )  # fmt: skip
+    each = [_numbered(i, source) for i, source in enumerate(sources)]
+    if wanted.sorted:
+        each = [_sorted(messages, target.folder) for messages in each]
+    merged = heapq.merge(*each) if len(each) > 1 else each[0]
     for _, i, _, message in merged:
         source = sources[i]
         if wanted.keeps(source.channels[message.channel_id].record.topic, message.log_time, first):
             target.message(source, message)
             source.result.messages += 1
+
+
+_Numbered = tuple[int, int, int, p.MessageRecord]
+"""The log time, the number of the source, the number within it, and the message."""
+
+
+def _sorted(messages: Iterator[_Numbered], folder: Path) -> Iterator[_Numbered]:
+    """Yield the messages by their own log time. Sorted parts of :data:`SORTED_BYTES` are kept in temporary files."""
+    with ExitStack() as files:
+        parts, part, held = list[Iterator[_Numbered]](), list[_Numbered](), 0
+        for _, i, number, message in messages:
+            part.append((message.log_time, i, number, message))
+            held += len(message.data) + MESSAGE_OVERHEAD
+            if held >= SORTED_BYTES:
+                parts.append(_stored(sorted(part), files.enter_context(TemporaryFile(dir=folder))))
+                part, held = [], 0
+        yield from heapq.merge(*parts, iter(sorted(part)))
+
+
+def _stored(part: list[_Numbered], file: IO[bytes]) -> Iterator[_Numbered]:
+    """Write a sorted part to a file, and return an iterator that reads it again."""
+    for each in part:
+        pickle.dump(each, file, pickle.HIGHEST_PROTOCOL)
+    file.seek(0)
+    return (pickle.load(file) for _ in range(len(part)))
 
 
 def _numbered(i: int, source: _Source) -> Iterator[tuple[int, int, int, p.MessageRecord]]:

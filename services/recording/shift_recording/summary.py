@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,8 @@ class RecordingInfo:
     duration_s: float
     counts: dict[str, int]
     gaze_samples: int
+    clocks: list[dict[str, Any]]
+    """The ledger of each gaze source (topic ``clock``); empty before the session's end, and before format 5."""
     attachments: dict[str, int]
     metadata: dict[str, dict[str, str]]
     checksum: str
@@ -65,6 +67,7 @@ class _Scanned:
     last: int = 0
     session: Session | None = None
     samples: int = 0
+    clocks: list[dict[str, Any]] = field(default_factory=list)
 
 
 def info_of(path: Path) -> RecordingInfo:
@@ -95,6 +98,7 @@ def info_of(path: Path) -> RecordingInfo:
         duration_s=_duration_s(fact, scanned),
         counts=dict(scanned.counts),
         gaze_samples=scanned.samples,
+        clocks=scanned.clocks,
         attachments={name: len(a.data) for name, a in recording.attachments.items()},
         metadata=recording.metadata,
         checksum=checksum,
@@ -120,6 +124,9 @@ def _scanned(recording: Recording) -> _Scanned:
             found.last = message.log_time
             if message.topic == "gaze":
                 found.samples += len(json.loads(message.data)["t"])
+            if message.topic == "clock":
+                fact = fact_of(message.topic, message.data)
+                found.clocks.append(fact.model_dump(mode="json", exclude={"session", "stamp", "seen"}))
             if message.topic == "session":
                 fact = fact_of(message.topic, message.data)
                 found.session = fact if isinstance(fact, Session) else found.session

@@ -8,15 +8,18 @@ an observation of its own follows later.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NoReturn
 
 from shift_learner import core as learner
 from shift_monitor import core as monitor
+from shift_monitor.clock_ledger import EMPTY_LEDGER
 from shift_monitor.gaze_input import ChunkWithHistory, RecordedChunk
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import ShiftError
 from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import (
+    Clock,
     Fact,
     Fixation,
     Gaze,
@@ -58,6 +61,8 @@ class MonitorFold(OutputFold):
     def take(self, placed: FactAtPlace) -> None:
         """Derive up to the owner's next fact. Raises :class:`Differs`, ``NotRecorded``."""
         self._last, self._before_show = placed, None
+        if isinstance(placed.fact, Clock):
+            self.state = with_unrecorded(self.state, placed.fact)
         if not self.group:
             self._length, self._stepped = 0, None
             if isinstance(placed.fact, Gaze):
@@ -154,6 +159,14 @@ class MonitorFold(OutputFold):
         stream = self.state.stream
         before = {**self.state.former, stream.source: stream.numbering.last} if stream else {}
         return fact.seen.gaze != before
+
+
+def with_unrecorded(state: monitor.MonitorState, clock: Clock) -> monitor.MonitorState:
+    """Return the state with a ledger's counts of repeated and refused chunks, which nothing else records."""
+    ledger = replace(
+        state.ledgers.get(clock.source, EMPTY_LEDGER), repeated=clock.repeated, refused=dict(clock.refused)
+    )
+    return replace(state, ledgers={**state.ledgers, clock.source: ledger})
 
 
 class LearnerFold(OutputFold):

@@ -27,7 +27,7 @@ from shift_verify.verify import verify
 from support.verify_sessions import Session
 
 TABLES = ("sessions", "gaze", "fixations", "observations", "estimates", "decisions", "performances", "transitions",
-          "markers", "overrides")  # fmt: skip
+          "markers", "overrides", "clocks")  # fmt: skip
 SCREEN = Screen(1920, 1080)
 
 

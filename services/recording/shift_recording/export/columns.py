@@ -20,6 +20,8 @@ ColumnType = Literal["text", "number", "integer", "boolean", "time"]
 
 PLAIN: dict[object, ColumnType] = {str: "text", float: "number", int: "integer", bool: "boolean"}
 SINGULAR = {"probabilities": "probability"}
+REFUSALS = ("malformed", "conflict", "too-large", "unavailable")
+"""The kinds of problems for which the monitor refuses a chunk of gaze."""
 UNITS = {"_s": "s", "_utc": "UTC", "_cm": "cm"}
 
 
@@ -90,6 +92,8 @@ def _keys(name: str, names: Names) -> Mapping[str, None]:
         return names.aois
     if last == "awareness":
         return names.tasks
+    if name == "refused":
+        return dict.fromkeys(REFUSALS)
     return names.strategies if last in ("strategy", "scores", "suggested", "action") else {}
 
 

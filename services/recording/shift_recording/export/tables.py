@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from shift_schemas.messages import (
+    Clock,
     Config,
     Decision,
     Estimate,
@@ -35,6 +36,7 @@ from shift_recording.mcap.reader import RecordedFact
 TABLES: dict[str, type[Fact]] = {
     "gaze": Gaze, "fixations": Fixation, "observations": Observation, "estimates": Estimate, "decisions": Decision,
     "performances": Performance, "transitions": Transition, "markers": Marker, "overrides": Override,
+    "clocks": Clock,
 }  # fmt: skip
 """The tables with one row for each fact, and its class; ``gaze`` has one row for each sample."""
 TABLE_OF = {kind.subject: name for name, kind in TABLES.items()}

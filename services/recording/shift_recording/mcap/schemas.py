@@ -46,7 +46,9 @@ def schema_name(subject: str) -> str:
 
 def known_names(study: Study | None, policy_states: Sequence[str] = ()) -> dict[str, Sequence[str]]:
     """Return the known names of each map."""
-    names: dict[str, Sequence[str]] = {"session.counts": SUBJECTS, "policy.states": policy_states}
+    names: dict[str, Sequence[str]] = {
+        "session.counts": SUBJECTS, "policy.states": policy_states, "clock.refused": ("malformed", "conflict"),
+    }  # fmt: skip
     if study is not None:
         strategies = tuple(study.scoring.strategies)
         names |= {"observation.gaze.weights": study.aoi_names, "observation.awareness": study.tasks or ()}

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, Protocol, TypeVar
 
 from shift_schemas.core_protocol import Step
+from shift_schemas.errors import ShiftError
 from shift_schemas.messages import Fact
 from shift_schemas.timestamps import Stamp
 
@@ -57,6 +58,8 @@ class Core(Generic[S]):
     """Turns a request's message into what the core steps on, given the state and the facts recorded before."""
     held: Callable[[S], Any | None] = lambda state: None
     """Returns the event that makes the core publish what it holds back, or None if it holds nothing back."""
+    refused: Callable[[S, Any, ShiftError], S] | None = None
+    """Returns the state after a request that was refused, for a core that counts refusals."""
     parts: Parts[S] | None = None
     """The parts of the state that are kept apart, if there are any."""
     lookups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)

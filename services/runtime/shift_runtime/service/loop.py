@@ -212,6 +212,7 @@ class Worker(Generic[S]):
         except UnknownThing as e:
             self._answer_unknown(request, e)
         except ShiftError as e:
+            self._count_refusal(request, e)
             self.transactions.refuse(request, e)
         except Exception as e:  # a mistake in this service must not end it for everybody else
             log.exception("a command failed", procedure=request.procedure, session=request.session)
@@ -221,6 +222,14 @@ class Worker(Generic[S]):
             self.transactions.apply_step(request.session, step)
             self.transactions.store_answer(request, step)
             self.held_back.note(request.session, step.state)
+
+    def _count_refusal(self, request: PendingRequest, error: ShiftError) -> None:
+        """Let the core count a refusal; this is committed like input without a visible effect."""
+        state = self.states.get(request.session)
+        if self.core.refused is not None and state is not None:
+            after = self.core.refused(state, request.message, error)
+            if after is not state:
+                self.transactions.apply_step(request.session, Step(after))
 
     def _step(self, request: PendingRequest, message: Any) -> Step[S]:
         return self.core.step(self.states.get(request.session), message, self.clock.now(), timed_out=request.timed_out)
