@@ -61,6 +61,7 @@ CHANGES: dict[str, Sequence[tuple[Sequence[str | int], Callable[[Any], Any]]]] =
     "seed": [(["seed"], lambda v: v + 1)],
     "override_id": [(["override_id"], lambda v: "another")],
     "reason": [(["reason"], lambda v: "another")],
+    "text": [(["text"], lambda v: "another")],
 }
 """Changes of the fields that a decision derives; what it answers (id, task, what was required) is tried below."""
 INPUTS = {"decision_id", "task", "required"}

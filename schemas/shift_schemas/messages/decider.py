@@ -80,6 +80,9 @@ class Decision(Fact):
     )
     override_id: str = Field(default="", description="The override that it follows; '' is no override.")
     reason: str = Field(default="", description="The override's reason.")
+    text: str | None = Field(
+        default=None, description="What the robot says; left out: the study has no sentence for it."
+    )
 
 
 class Override(Fact):
