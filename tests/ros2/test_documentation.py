@@ -45,7 +45,7 @@ class Robot:
                 self.decision_id = json.loads(message)["decision_id"]
                 assert json.loads(message)["seen"]["gaze"] == {"ros": 0}
             case ["ros2", "topic", "echo", topic, "std_msgs/msg/String"]:
-                assert self.node.said(topic), topic
+                assert self.node.texts(topic), topic
             case _:
                 raise AssertionError(words)
 
@@ -62,17 +62,18 @@ def test_the_lines_of_the_page_work(backend: str, name: str, tmp_path: Path) -> 
             peer(name, bridge) as node,
         ):
             robot = Robot(node)
-            for topic in ("decision", "observation", "diagnostics"):
+            for topic in ("decision", "observation", "say", "diagnostics"):
                 node.ask("hear", f"/shift/{topic}")
             time.sleep(0.5)
             tried = list(lines("tried"))
-            assert len(tried) == 7
+            assert len(tried) == 8
             for words in tried[:4]:
                 robot.do(words)
             node.publish("/shift/gaze", "{")
             time.sleep(1.5)
             for words in tried[4:]:
                 robot.do(words)
+            assert node.texts("/shift/say") == [node.said("/shift/decision")[-1]["text"]]
             assert node.said("/shift/observation")[-1]["seen"]["performance"] == 1
             assert node.said("/shift/diagnostics")[-1]["dropped"] == {"gaze": {"malformed": 1}}
 
