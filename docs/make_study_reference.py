@@ -16,6 +16,7 @@ from shift_study.constants import (
     RewardSettings,
 )
 from shift_study.learner_settings import LearnerSettings
+from shift_study.phrases import PhrasesSettings, TaskPhrases
 from shift_study.scoring_table import StrategySettings
 
 PAGE = Path(__file__).with_name("study.md")
@@ -29,6 +30,8 @@ PARTS = {
     "scoring.strategies.NAME": StrategySettings,
     "decider": DeciderSettings,
     "learner": LearnerSettings,
+    "phrases": PhrasesSettings,
+    "phrases.tasks.NAME": TaskPhrases,
 }
 
 

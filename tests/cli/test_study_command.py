@@ -95,7 +95,7 @@ def test_a_study_with_mistakes_is_not_shown(data: Path) -> None:
 
 def test_an_unknown_study_is_wrong_use_and_the_nearest_is_named(data: Path) -> None:
     done = RUNNER.invoke(app, ["study", "show", "cofee", "--data", str(data)])
-    assert "there are bad, coffee, default, far, own; did you mean 'coffee'?" in str(done.exception)
+    assert "there are bad, coffee, coffee_de, default, far, own; did you mean 'coffee'?" in str(done.exception)
 
 
 def test_every_study_is_listed_with_where_it_is_from(data: Path) -> None:
@@ -111,7 +111,7 @@ def test_every_study_is_listed_with_where_it_is_from(data: Path) -> None:
 
 def test_a_list_as_json_has_names_titles_mistakes_and_warnings(data: Path) -> None:
     found = {s["name"]: s for s in document("list", "--data", data, exit_code=1)["studies"]}
-    assert list(found) == ["bad", "coffee", "default", "far", "own"]
+    assert list(found) == ["bad", "coffee", "coffee_de", "default", "far", "own"]
     assert (found["own"]["title"], found["own"]["mistakes"], found["own"]["warnings"]) == ("My own", [], [])
     assert (len(found["bad"]["mistakes"]), len(found["far"]["warnings"])) == (2, 1)
     assert found["coffee"]["place"] == "built-in"
@@ -120,7 +120,7 @@ def test_a_list_as_json_has_names_titles_mistakes_and_warnings(data: Path) -> No
 def test_without_a_folder_the_built_in_studies_are_listed_and_that_is_said(tmp_path: Path) -> None:
     done = run("list", "--data", tmp_path)
     assert f"{tmp_path / 'studies'} is not there; the built-in studies only" in done.stderr
-    assert [s["name"] for s in document("list", "--data", tmp_path)["studies"]] == ["coffee", "default"]
+    assert [s["name"] for s in document("list", "--data", tmp_path)["studies"]] == ["coffee", "coffee_de", "default"]
 
 
 @pytest.mark.parametrize("command", ["check", "show", "list"])

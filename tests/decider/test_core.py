@@ -124,6 +124,26 @@ def test_a_decision_carries_all_that_it_was_derived_from() -> None:
     assert [tuple(a.values()) for a in found.actions] == list(SCORING.actions)
 
 
+@pytest.mark.parametrize("strategy", SCORING.choices, ids=lambda s: "+".join(s.values()))
+def test_a_decision_has_the_text_of_its_strategy_and_none_without_phrases(strategy: dict[str, str]) -> None:
+    sentences = {level: f"{level} {{it}}" for level in ("affirmation", "negation_affirmation", "negation")}
+    templates = {"hesitation": {"hesitation": "um, {sentence}"}}
+    phrases = {"sentences": sentences, "templates": templates, "tasks": {"grasp": {"words": {"it": "the cup"}}}}
+    level, pause = strategy["negation"], strategy["hesitation"] == "hesitation"
+    row = [float(a == tuple(strategy.values())) for a in SCORING.actions]
+    spoken = folded(session(), config(phrases=phrases), observation(), policy(row=row))
+    assert made(spoken).text == (f"Um, {level} the cup" if pause else f"{level[0].upper()}{level[1:]} the cup")
+    assert made(spoken, task="turn").text is None
+    assert made(folded(session(), config(), observation(), policy(row=row))).text is None
+
+
+def test_an_override_is_said_with_its_own_sentence() -> None:
+    phrases = {"sentences": {"affirmation": "go.", "negation": "stop."}}
+    state = folded(session(), config(phrases=phrases), observation(), policy())
+    command = SetOverride(command_id="o1", session="s1", task="grasp", strategy=NEGATED)
+    assert made(core.step(state, command, NOW).state).text == "Stop."
+
+
 rows = st.lists(st.integers(0, 5), min_size=6, max_size=6).filter(any).map(lambda w: [x / sum(w) for x in w])
 
 

@@ -30,7 +30,7 @@ def in_a_fresh_clone(folder: Path, mesh: LiveMesh) -> dict[str, str]:
         (folder / name).symlink_to(ROOT / name)
     return {
         **os.environ, "SHIFT_URL": mesh.url, "SHIFT_ZENOH": mesh.zenoh, "SHIFT_ROS_ROUTER": mesh.zenoh,
-        "COLUMNS": "120",
+        "COLUMNS": "120", "SHIFT_PAUSE": "0",
     }  # fmt: skip
 
 

@@ -110,6 +110,16 @@ async def test_preview_is_the_decision_that_follows_and_has_no_side_effect(mesh:
         await session.report(f"d{n}", understood=n % 2 == 0)
 
 
+async def test_decision_and_preview_have_the_text_of_the_study(mesh: Mesh) -> None:
+    phrases = {"sentences": {"affirmation": "take {task}.", "negation": "do not take {task}."}}
+    session = await mesh.session({**STUDY, "phrases": phrases})
+    silent = {"negation": "negation_affirmation", "hesitation": "none"}
+    for strategy, text in ((PLAIN, "Take grasp."), (NEGATED, "Do not take grasp."), (silent, None)):
+        await session.done("override", {"task": "grasp", "strategy": strategy})
+        assert (await session.read("strategy?task=grasp"))["text"] == text
+        assert (await session.decide())["text"] == text
+
+
 async def test_preview_shows_an_override_that_waits(mesh: Mesh) -> None:
     session = await mesh.session()
     await session.done("override", {"task": "grasp", "strategy": NEGATED})

@@ -96,7 +96,7 @@ async def test_study_object_and_its_condition_are_in_force(mesh: Mesh) -> None:
 
 @pytest.mark.parametrize(
     ("change", "field", "says"),
-    [({"study": "nobody"}, "study", "there are coffee, default"),
+    [({"study": "nobody"}, "study", "there are coffee, coffee_de, default"),
      ({"condition": "x"}, "condition", "control, adaptive"),
      ({"study": {**STUDY, "reward": {"decay": -1}}}, "reward.decay", "it must be at least 0"),
      ({"study": {**STUDY, "rewrad": {}}}, "rewrad", "write 'reward'"), ({"study": {}}, "study", "missing"),

@@ -31,7 +31,7 @@ async def test_every_study_is_listed_with_mistakes_and_warnings(mesh: Mesh, fold
     answer = await mesh.ask("GET", "/v1/studies")
     assert answer.status_code == 200
     found = {s["name"]: s for s in answer.json()["studies"]}
-    assert list(found) == ["bow", "coffee", "default", "far", "own"]
+    assert list(found) == ["bow", "coffee", "coffee_de", "default", "far", "own"]
     assert found["own"] == {"name": "own", "title": "My own", "mistakes": [], "warnings": []}
     assert found["coffee"]["title"] == "Making coffee with a robot"
     assert found["bow"]["mistakes"][0].startswith("bow.yaml:3: aois.0.polygon: cup crosses itself")
@@ -51,7 +51,7 @@ async def test_unknown_study_is_404(mesh: Mesh, folder: Path, name: str) -> None
     assert answer.status_code == 404
     assert answer.headers["content-type"] == "application/problem+json"
     if name == "cofee":
-        assert answer.json()["detail"].endswith("bow, coffee, default, far, own; did you mean 'coffee'?")
+        assert answer.json()["detail"].endswith("bow, coffee, coffee_de, default, far, own; did you mean 'coffee'?")
         assert [(e["field"], e["value"]) for e in answer.json()["errors"]] == [("study", "cofee")]
 
 

@@ -59,7 +59,7 @@ class Robot:
                 self.node.ask("service", name)
                 self.decision_id = self.decision_that_saw_the_gaze(name)["decision_id"]
             case ["ros2", "topic", "echo", topic, "std_msgs/msg/String"]:
-                assert self.node.said(topic), topic
+                assert self.node.texts(topic), topic
             case _:
                 raise AssertionError(words)
 
@@ -76,11 +76,11 @@ def test_the_lines_of_the_page_work(backend: str, name: str, tmp_path: Path) -> 
             peer(name, bridge) as node,
         ):
             robot = Robot(node)
-            for topic in ("decision", "observation", "diagnostics"):
+            for topic in ("decision", "observation", "say", "diagnostics"):
                 node.ask("hear", f"/shift/{topic}")
             time.sleep(0.5)
             tried = list(lines("tried"))
-            assert len(tried) == 7
+            assert len(tried) == 8
             for words in tried[:4]:
                 robot.do(words)
             node.publish("/shift/gaze", "{")
@@ -88,6 +88,7 @@ def test_the_lines_of_the_page_work(backend: str, name: str, tmp_path: Path) -> 
             mesh.until(lambda: any(m["dropped"] == {"gaze": {"malformed": 1}} for m in node.said("/shift/diagnostics")))
             for words in tried[4:]:
                 robot.do(words)
+            mesh.until(lambda: node.texts("/shift/say")[-1:] == [node.said("/shift/decision")[-1]["text"]])
 
 
 def test_the_program_of_the_page_is_python() -> None:

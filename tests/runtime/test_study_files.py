@@ -25,10 +25,11 @@ def refusal(name: str, folder: Path) -> str:
     return refused.value.detail
 
 
-def test_built_in_studies_are_coffee_and_default(tmp_path: Path) -> None:
+def test_built_in_studies_are_coffee_in_two_languages_and_default(tmp_path: Path) -> None:
     coffee, default = started("coffee", tmp_path), started("default", tmp_path)
     assert coffee.tasks == ["grasp", "turn", "pour"]
     assert list(coffee.conditions) == ["control", "adaptive"]
+    assert started("coffee_de", tmp_path).tasks == coffee.tasks
     assert default.tasks is None
     assert default.aoi_names == ("left", "middle", "right")
 
@@ -60,10 +61,10 @@ def test_json_file_may_be_indented_with_tabs(tmp_path: Path) -> None:
 def test_unknown_name_is_refused_with_the_known_names_and_the_nearest(tmp_path: Path) -> None:
     (tmp_path / "own.yaml").write_text("study: own\n")
     (tmp_path / "notes.txt").write_text("study: notes\n")
-    with pytest.raises(InvalidStudy, match="there are coffee, default, own; did you mean 'coffee'") as refused:
+    with pytest.raises(InvalidStudy, match="coffee, coffee_de, default, own; did you mean 'coffee'") as refused:
         study_to_start("cofee", tmp_path)
     assert [(e.field, e.value) for e in refused.value.errors] == [("study", "cofee")]
-    assert refusal("notes", tmp_path).endswith("there are coffee, default, own")
+    assert refusal("notes", tmp_path).endswith("there are coffee, coffee_de, default, own")
 
 
 @pytest.mark.parametrize(
@@ -137,7 +138,7 @@ def test_every_study_is_listed_with_title_place_mistakes_and_warnings(tmp_path: 
     (tmp_path / "bad.yml").write_text("study: bad\nlearner: {epsilon: 2}\n")
     (tmp_path / "my study.yaml").write_text("study: mine\n")
     found = {study.name: study for study in list_studies(tmp_path)}
-    assert list(found) == ["bad", "coffee", "default", "far", "my study"]
+    assert list(found) == ["bad", "coffee", "coffee_de", "default", "far", "my study"]
     assert (found["coffee"].title, found["coffee"].place) == ("Making coffee with a robot", BUILT_IN)
     assert found["coffee"].mistakes == found["coffee"].warnings == found["default"].warnings == ()
     assert (found["far"].title, found["far"].place) == ("Far away", str(tmp_path / "far.yaml"))

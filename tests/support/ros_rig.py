@@ -136,7 +136,12 @@ class Peer:
         return decision
 
     def said(self, topic: str, since: int = 0) -> list[dict[str, Any]]:
-        return [json.loads(text) for text in self.ask("heard", topic, since)]
+        return [json.loads(text) for text in self.texts(topic, since)]
+
+    def texts(self, topic: str, since: int = 0) -> list[str]:
+        """Return what was heard on a topic, as it was published."""
+        heard: list[str] = self.ask("heard", topic, since)
+        return heard
 
     def stop(self) -> None:
         with suppress(BrokenPipeError):

@@ -62,6 +62,7 @@ CHANGES: dict[str, Sequence[tuple[Sequence[str | int], Callable[[Any], Any]]]] =
     "override_id": [(["override_id"], lambda v: "another")],
     "reason": [(["reason"], lambda v: "another")],
     "without_override": [(["without_override"], lambda v: {"negation": "negation", "hesitation": "none"})],
+    "text": [(["text"], lambda v: "another")],
 }
 """Changes of the fields that a decision derives; what it answers (id, task, what was required) is tried below."""
 INPUTS = {"decision_id", "task", "required"}

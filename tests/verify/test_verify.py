@@ -180,6 +180,30 @@ def test_the_difference_says_field_and_both_values(recording: Path, tmp_path: Pa
     assert json.loads(json.dumps(difference.as_json()))["field"] == "reward"
 
 
+PHRASES = {"sentences": {"affirmation": "take it.", "negation": "not that."},
+           "templates": {"hesitation": {"hesitation": "um, {sentence}"}}}  # fmt: skip
+"""Phrases without a sentence for negation_affirmation."""
+
+
+@pytest.mark.parametrize("change", [lambda text: f"{text} ", lambda text: None, lambda text: "" if text else "hello"])
+def test_a_changed_text_is_found(tmp_path: Path, change: Callable[[Any], Any]) -> None:
+    recording = Session({"phrases": PHRASES}).interactions(40).ended().finished(tmp_path / "whole")
+    assert verify(recording).difference is None
+    texts = [json.loads(m.data).get("text") for m in Recording(recording).messages({"decision"})]
+    assert set(texts) == {"Take it.", "Um, take it.", "Not that.", "Um, not that.", None}
+    number = next(n for n, text in enumerate(texts) if text)
+    difference = verify(rewritten(recording, tmp_path / "t", changed("decision", number, ["text"], change))).difference
+    assert difference is not None
+    assert (difference.subject, difference.field, difference.derived) == ("decision", "text", texts[number])
+
+
+def test_a_text_in_a_study_without_phrases_is_found(recording: Path, tmp_path: Path) -> None:
+    tampered = rewritten(recording, tmp_path / "t", changed("decision", 3, ["text"], lambda v: "take it."))
+    difference = verify(tampered).difference
+    assert difference is not None
+    assert (difference.subject, difference.field, difference.derived) == ("decision", "text", None)
+
+
 def test_a_changed_override_shows_in_the_decision_that_follows_it(recording: Path, tmp_path: Path) -> None:
     for path, value in ((["strategy", "negation"], "affirmation"), (["reason"], "no"), (["task"], "b")):
         edit = changed("override", 2, path, lambda v, value=value: value)

@@ -83,6 +83,9 @@ class Decision(Fact):
     without_override: Strategy | None = Field(
         default=None, description="What SHIFT would have chosen without the override; left out without one."
     )
+    text: str | None = Field(
+        default=None, description="What the robot says; left out: the study has no sentence for it."
+    )
 
 
 class Override(Fact):

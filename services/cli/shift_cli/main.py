@@ -14,6 +14,7 @@ from shift_schemas.shards import MOST_SHARDS
 from shift_simulator import commands as evaluate_commands
 
 from shift_cli import (
+    demo_command,
     doctor_command,
     export_command,
     gaze_command,
@@ -112,6 +113,7 @@ def router() -> None:
 
 
 app.command("doctor")(doctor_command.doctor)
+app.command("demo")(demo_command.demo)
 app.command("simulate")(simulate_command.simulate)
 app.command("verify")(verify_command.verify)
 app.command("whatif")(whatif_command.whatif)

@@ -38,6 +38,7 @@ from shift_schemas.messages import (
 from shift_schemas.suggestions import did_you_mean
 from shift_schemas.timestamps import Stamp
 from shift_study.loading import study_from_json
+from shift_study.phrases import text_for
 from shift_study.scoring import Reduction, reductions, view
 from shift_study.study import Study
 
@@ -248,6 +249,7 @@ def decide(state: DeciderState, task: str, decision_id: str, required: Seen, now
         required=required if state.records_inputs else None,
         override_id=override.override_id if override else "", reason=override.reason if override else "",
         without_override=choices[choice.own] if override and state.records_own_choice else None,
+        text=text_for(study.phrases, task, choices[choice.action]),
     )  # fmt: skip
 
 

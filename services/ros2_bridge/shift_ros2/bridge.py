@@ -10,6 +10,7 @@ import asyncio
 import time
 from collections import OrderedDict
 from functools import partial
+from typing import Any
 
 import structlog
 from shift_runtime.clock import Clock
@@ -156,14 +157,21 @@ class Bridge:
         answer, repeat = await self.mesh.decide(session, task, request_id)
         text = mapping.text_of_answer(answer)
         if not repeat:
-            self._publish_before_reply(session, answer["decision_id"], text)
+            self._publish_before_reply(session, answer, text)
         return text
 
-    def _publish_before_reply(self, session: str, decision_id: str, text: str) -> None:
+    def _publish_before_reply(self, session: str, answer: dict[str, Any], text: str) -> None:
         """Publish before replying, so that a crash cannot leave an acknowledged decision unpublished."""
+        decision_id: str = answer["decision_id"]
         if decision_id not in self.mesh.read_model.views[session].decisions:
             self._published_early.add(decision_id)
-            self.backend.publish("decision", text)
+            self._publish_decision(text, answer.get("text"))
+
+    def _publish_decision(self, text: str, said: str | None) -> None:
+        """Publish a decision, and ``said``, which is what the robot says, for a text-to-speech node."""
+        self.backend.publish("decision", text)
+        if said:
+            self.backend.publish("say", said)
 
     def _mark(self, text: str | None) -> None:
         if text is not None:
@@ -218,7 +226,11 @@ class Bridge:
         if isinstance(fact, Decision) and fact.decision_id in self._published_early:
             self._published_early.discard(fact.decision_id)
             return
-        self.backend.publish(fact.subject, mapping.text_of_fact(fact, payload))
+        text = mapping.text_of_fact(fact, payload)
+        if isinstance(fact, Decision):
+            self._publish_decision(text, fact.text)
+        else:
+            self.backend.publish(fact.subject, text)
 
     async def _publish_diagnostics(self) -> None:
         while True:

@@ -9,7 +9,7 @@ from shift_ros2.rmw_zenoh import STRING, TRIGGER, RosType
 
 Direction = Literal["in", "out", "service"]
 Topic = Literal[
-    "gaze", "task_performance", "task", "next_strategy", "observation", "estimate", "decision", "diagnostics"
+    "gaze", "task_performance", "task", "next_strategy", "observation", "estimate", "decision", "say", "diagnostics"
 ]  # fmt: skip
 
 
@@ -36,6 +36,7 @@ INTERFACES: tuple[Interface, ...] = (
     Interface("observation", "out"),
     Interface("estimate", "out"),
     Interface("decision", "out"),
+    Interface("say", "out"),
     Interface("diagnostics", "out"),
 )
 PUBLISHED: frozenset[str] = frozenset({"observation", "estimate", "decision"})

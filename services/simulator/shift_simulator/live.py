@@ -17,15 +17,16 @@ from shift_study.loading import as_recorded, study_of
 from shift_study.study import Study
 
 from shift_simulator.gaze_plan import chunk_of, plan_gaze
-from shift_simulator.simulated_person import SimulatedPerson, create_person, task_names
+from shift_simulator.simulated_person import Outcome, SimulatedPerson, create_person, task_names
 from shift_simulator.users import User
 
 
 class LiveEpisode(NamedTuple):
-    """One interaction: the decision and the performance as the gateway answered them."""
+    """One interaction: the decision and the performance as the gateway answered them, and what the person did."""
 
     decision: dict[str, Any]
     performance: dict[str, Any]
+    outcome: Outcome
 
 
 def study_at(shift: RestClient, session: str) -> Study:
@@ -58,7 +59,7 @@ def drive(shift: RestClient, session: str, user: User, episodes: int) -> Iterato
             outcome.success, outcome.comprehension_s, outcome.success, outcome.enabledness_s,
         )  # fmt: skip
         person = person.after(action)
-        yield LiveEpisode(decision, performance)
+        yield LiveEpisode(decision, performance, outcome)
 
 
 class _GazeSource:

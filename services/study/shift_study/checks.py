@@ -15,6 +15,7 @@ from shift_model.vocabulary import TRIPLES
 from shift_study.area_checks import area_warnings
 from shift_study.learner_settings import COMMON, LEARNER_SETTINGS, LearnerSettings, parameters_of
 from shift_study.loading import study_in_force
+from shift_study.phrase_checks import phrase_warnings
 from shift_study.scoring import scores
 from shift_study.scoring_table import ScoringTable
 from shift_study.study import Study
@@ -59,7 +60,12 @@ def study_warnings(study: Study) -> tuple[str, ...]:
 
 
 def _warnings_in_force(study: Study) -> list[str]:
-    return [*_implausible(study), *_shares_in_table(study.scoring.table), *_levels_out_of_reach(study)]
+    found = [*_implausible(study), *_shares_in_table(study.scoring.table), *_levels_out_of_reach(study)]
+    return found + _silences(study)
+
+
+def _silences(study: Study) -> list[str]:
+    return [] if study.phrases is None else [*phrase_warnings(study.phrases, study.tasks, study.scoring)]
 
 
 def _implausible(study: Study) -> Iterator[str]:

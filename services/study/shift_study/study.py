@@ -22,6 +22,8 @@ from shift_study.constants import (
 )
 from shift_study.fields import StimulusFile, StudyPart
 from shift_study.learner_settings import LearnerSettings
+from shift_study.phrase_checks import phrase_mistakes
+from shift_study.phrases import PhrasesSettings
 from shift_study.scoring_table import ScoringSettings, strategy_name
 
 
@@ -62,6 +64,9 @@ class Study(StudyPart):
     scoring: ScoringSettings = Field(default_factory=lambda: ScoringSettings.model_validate({}))
     decider: DeciderSettings = DeciderSettings()
     learner: LearnerSettings = LearnerSettings()
+    phrases: PhrasesSettings | None = Field(
+        default=None, description="What the robot says; left out: a decision has no text."
+    )
 
     @field_validator("tasks")
     @classmethod
@@ -105,6 +110,9 @@ class Study(StudyPart):
                 raise ValueError(
                     f"conditions.{name} overrides {', '.join(fixed)}; it can override {', '.join(sorted(CONDITIONAL))}"
                 )
+        if self.phrases is not None:
+            for mistake in phrase_mistakes(self.phrases, self.tasks, self.scoring):
+                raise ValueError(mistake)
         return self
 
     def _check_prior(self) -> None:

@@ -15,7 +15,7 @@ from shift_gateway.web.room_view import room_view
 from shift_runtime.bus.memory import MemoryBus
 from shift_schemas.errors import UnknownThing
 from shift_schemas.timestamps import NS
-from support.gateway_mesh import HANG_LIMIT_S, NEGATED, STUDY, Mesh, Session
+from support.gateway_mesh import HANG_LIMIT_S, NEGATED, PLAIN, STUDY, Mesh, Session
 
 pytestmark = pytest.mark.anyio
 
@@ -110,6 +110,18 @@ async def test_room_view_shows_the_last_decision_and_the_missing_result(own_mesh
         assert view.overrides == {}
         assert view.sources["ros"].source == "ros"
         assert view.looked_at == ()
+
+
+async def test_room_view_says_the_text_of_the_decision_and_the_strategy_where_there_is_none(own_mesh: Mesh) -> None:
+    async with following(own_mesh) as (_, histories):
+        session = await own_mesh.session({**STUDY, "phrases": {"sentences": {"affirmation": "take it."}}})
+        history = await histories.open(session.name)
+        for strategy, say in ((PLAIN, "Take it."), (NEGATED, "negation")):
+            await session.done("override", {"task": "grasp", "strategy": strategy})
+            await session.decide()
+            async with asyncio.timeout(HANG_LIMIT_S):
+                while room_view(history, 10 * NS).say != say:  # noqa: ASYNC110 - a history has no event
+                    await asyncio.sleep(0.01)
 
 
 async def test_room_view_of_an_earlier_time_shows_what_held_then(own_mesh: Mesh) -> None:

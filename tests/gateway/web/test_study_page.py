@@ -85,7 +85,7 @@ def test_name_that_is_not_an_id_is_refused(tab: Tab, mesh: LiveMesh, name: str) 
 def test_unknown_study_lists_the_known_ones(tab: Tab) -> None:
     tab.go("/study/nothing")
     tab.page.get_by_text("there is no study of that name").wait_for(timeout=WAIT_MS)
-    expect(tab.page.get_by_role("link", name="coffee")).to_have_attribute("href", "/study/coffee")
+    expect(tab.page.get_by_role("link", name="coffee", exact=True)).to_have_attribute("href", "/study/coffee")
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])

@@ -18,7 +18,7 @@ STIMULUS_PATH = "/page-stimulus"
 LONG_SAY = 40
 """A longer text is shown a little smaller, so that it fits; characters."""
 TOOLTIPS = {
-    "say": "How the robot phrases its next explanation: the last decision's strategy (paper, section III-B).",
+    "say": "What the robot says: the last decision's text, or else its strategy (paper, section III-B).",
     "state": "The cognitive state: what the scoring table reduces the observations to (paper, section III-C, Table I).",
     "capacity": "Processing capacity, which explanations draw on and repetition recharges (paper, section III-A1).",
     "stimulus": "The areas of interest, and the last point of each gaze source that sends points.",
