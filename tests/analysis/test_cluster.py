@@ -10,16 +10,22 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import pytest
 from shift_analysis.robustness import robustness
 from shift_analysis.whatif import OtherPolicy, compare_recordings, what_if
+from shift_recording.export.export import Way, export
 from shift_recording.parallel import for_each
 from shift_schemas.errors import Unavailable
+from shift_simulator.compare import compare
+from shift_simulator.user_study import users
+from shift_simulator.users import paper_user
 from shift_verify.many import report_on_many
 from support.verify_sessions import Session
 
 pytestmark = pytest.mark.timeout(180)
+KEPT = sorted((Path(__file__).parents[1] / "data" / "v0.2").glob("*.mcap"))
 STARTED_WITHIN_S = 60
 
 
@@ -73,6 +79,30 @@ def test_results_of_the_cluster_are_the_same(scheduler: str, recordings: list[Pa
     assert there == here
     assert list(robustness(recordings, scheduler=scheduler)) == list(robustness(recordings, workers=1))
     assert list(report_on_many(recordings, scheduler=scheduler)) == list(report_on_many(recordings, workers=2))
+
+
+@pytest.mark.parametrize("to", ["csv", "parquet"])
+def test_exported_tables_are_the_same(scheduler: str, tmp_path: Path, to: Literal["csv", "parquet"]) -> None:
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(KEPT[0].read_bytes()[:3000])
+    paths = [*KEPT[1:4], damaged]
+    ways = {"one": Way(1), "two": Way(2), "cluster": Way(scheduler=scheduler)}
+    done = {name: export(paths, to, tmp_path / name, way=way) for name, way in ways.items()}
+    for name in ("two", "cluster"):
+        assert done[name].rows == done["one"].rows
+        assert done[name].report == done["one"].report
+        for file in done["one"].files:
+            assert (tmp_path / name / file.name).read_bytes() == file.read_bytes(), file.name
+    assert not list(tmp_path.glob("*/.parts*"))
+
+
+def test_evaluation_is_the_same(scheduler: str) -> None:
+    people = [paper_user("A"), paper_user("B")]
+    given = (["scoring", "thompson"], people, 3, 20, False, lambda text: None)
+    here = compare(*given)
+    assert compare(*given, workers=2) == here
+    assert compare(*given, scheduler=scheduler) == here
+    assert users(3, 20, scheduler=scheduler) == users(3, 20)
 
 
 def test_work_is_done_by_both_workers(scheduler: str) -> None:

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from shift_cli.recording_options import Files, Json, Scheduler, Workers
+
 if TYPE_CHECKING:
     from shift_recording.export.bids import Screen
     from shift_recording.export.export import Exported
 
 
 def export(
-    files: Annotated[list[Path], typer.Argument(help="Recordings, and folders of recordings.", envvar="SHIFT_FILES")],
+    files: Files,
     to: Annotated[
         Literal["csv", "parquet", "bids", "vw"],
         typer.Option(help="csv, parquet, bids (eye tracking), or vw (Vowpal Wabbit).", envvar="SHIFT_TO"),
@@ -32,7 +34,9 @@ def export(
         bool,
         typer.Option("--with-excluded", help="Also recordings excluded from analysis.", envvar="SHIFT_WITH_EXCLUDED"),
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
+    workers: Workers = 0,
+    scheduler: Scheduler = "",
+    as_json: Json = False,
 ) -> None:
     """Write the tables of recordings: sessions, gaze, decisions and more, all recordings together.
 
@@ -47,6 +51,7 @@ def export(
 
     from rich.console import Console
     from rich.progress import Progress
+    from shift_recording.export.export import Way
     from shift_recording.export.export import export as export_recordings
 
     console = Console(stderr=True)
@@ -54,7 +59,7 @@ def export(
         task = bar.add_task("exporting", total=None)
         done = export_recordings(
             files, to, out, covariates=covariates, screen=_screen(screen), with_excluded=with_excluded,
-            on_progress=lambda read, total: bar.update(task, completed=read, total=total),
+            way=Way(workers, scheduler, lambda read, total: bar.update(task, completed=read, total=total)),
         )  # fmt: skip
     typer.echo(json.dumps(done.as_json(), ensure_ascii=False)) if as_json else _show(done, out)
     for name, reason in done.report.excluded.items():

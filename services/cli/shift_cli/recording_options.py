@@ -7,14 +7,11 @@ from pathlib import Path
 from typing import Annotated, TypeVar
 
 import typer
+from shift_simulator.commands import Scheduler, Workers
+
+__all__ = ["Files", "Json", "Scheduler", "Workers", "with_progress"]
 
 Files = Annotated[list[Path], typer.Argument(help="Recordings, and folders of recordings.", envvar="SHIFT_FILES")]
-Workers = Annotated[
-    int, typer.Option(help="Processes at the same time; 0: one for each core.", min=0, envvar="SHIFT_WORKERS")
-]
-Scheduler = Annotated[
-    str, typer.Option(help="A Dask scheduler, tcp://HOST:PORT, that does the work.", envvar="SHIFT_SCHEDULER")
-]
 Json = Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")]
 Each = TypeVar("Each")
 

@@ -27,6 +27,12 @@ app = typer.Typer(
 Runs = Annotated[int, typer.Option(help="Simulated sessions per row.", envvar="SHIFT_RUNS", min=2, max=1_000_000)]
 Seed = Annotated[int, typer.Option(help="Seed of the experiment.", envvar="SHIFT_SEED", min=0, max=2**53 - 1)]
 Out = Annotated[Path | None, typer.Option(help="Folder for the JSON file and the figures.", envvar="SHIFT_OUT")]
+Workers = Annotated[
+    int, typer.Option(help="Processes at the same time; 0: one for each core.", min=0, envvar="SHIFT_WORKERS")
+]
+Scheduler = Annotated[
+    str, typer.Option(help="A Dask scheduler, tcp://HOST:PORT, that does the work.", envvar="SHIFT_SCHEDULER")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document.", envvar="SHIFT_JSON")]
 
 
@@ -49,7 +55,14 @@ def table2(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fa
 
 
 @app.command()
-def users(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = False) -> None:
+def users(
+    runs: Runs = 500,
+    seed: Seed = 0,
+    out: Out = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = "",
+    as_json: Json = False,
+) -> None:
     """Simulate users A to D with and without the scoring prior, and check point 4 of the criterion.
 
     \b
@@ -60,7 +73,7 @@ def users(runs: Runs = 500, seed: Seed = 0, out: Out = None, as_json: Json = Fal
 
     _make_folder(out)
     with _steps("users") as on_progress:
-        result = user_study.users(seed, runs, on_progress)
+        result = user_study.users(seed, runs, on_progress, workers, scheduler)
     if out is not None:
         user_study.draw_users(result, out)
     _output("users", result, out, as_json, report.print_users)
@@ -83,6 +96,8 @@ def learners(
         bool, typer.Option("--regret", help="Compute the exact optimum of each user.", envvar="SHIFT_REGRET")
     ] = False,
     out: Out = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = "",
     as_json: Json = False,
 ) -> None:
     """Compare learners on simulated users: reward, break-even, regret and worst dip.
@@ -100,7 +115,7 @@ def learners(
     people = [find_user(name) for name in user or ("A", "B", "C", "D")]
     _make_folder(out)
     with _progress("learners") as report_progress:
-        result = compare.compare(names, people, seed, runs, regret, report_progress)
+        result = compare.compare(names, people, seed, runs, regret, report_progress, workers, scheduler)
     if out is not None:
         compare.draw_learners(result, out)
     _output("learners", result, out, as_json, report.print_learners)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from shift_learner.learner import Context
+from shift_recording.parallel import for_each
 from shift_study.study import Study
 
 from shift_simulator.batched_learners import batch_learner
@@ -24,24 +26,31 @@ INTERVAL = 1.96
 
 
 def compare(
-    names: Sequence[str], people: Sequence[User], seed: int, runs: int, regret: bool, report_progress: OnProgress
-) -> dict[str, Any]:
+    names: Sequence[str], people: Sequence[User], seed: int, runs: int, regret: bool, report_progress: OnProgress,
+    workers: int = 1, scheduler: str = "",
+) -> dict[str, Any]:  # fmt: skip
     """Return the results of every learner with every user on the same sessions (docs/interface.md, "Command line").
 
     ``regret_mean`` is the exact optimum of the user (``optimum``) minus the mean reward, or None without ``regret``.
     Its standard error is that of the reward. ``reward_low`` and ``reward_high`` are the 10th and the 90th percentile
     of the runs. ``curves`` holds the mean cumulative reward after each episode, with the ends ``low`` and ``high`` of
-    its 95 % interval.
+    its 95 % interval. Each pair of learner and user can be simulated in a process of its own.
     """
+    pairs = [(name, user) for user in people for name in names]
+    simulated = for_each(partial(_rewards_of_pair, seed=seed, runs=runs), pairs, workers, scheduler)
     results, curves = [], []
     for user in people:
         best = optimum(user, Study(study="learners"), EPISODES) if regret else None
         for name in names:
             report_progress(f"{name} with user {user.user}")
-            cumulative = rewards_of(name, user, seed, runs)
+            cumulative = next(simulated)
             results.append({"learner": name, "user": user.user} | _summary(cumulative, best))
             curves.append({"learner": name, "user": user.user} | _curve(cumulative))
     return {"seed": seed, "runs": runs, "results": results, "curves": curves}
+
+
+def _rewards_of_pair(pair: tuple[str, User], seed: int, runs: int) -> Floats:
+    return rewards_of(*pair, seed, runs)
 
 
 def rewards_of(name: str, user: User, seed: int, runs: int, episodes: int = EPISODES) -> Floats:

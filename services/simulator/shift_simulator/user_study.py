@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from shift_learner.learner import Context
+from shift_recording.parallel import for_each
 from shift_study.study import Study
 
 from shift_simulator.batched_learners import BatchQLearning
@@ -17,17 +19,20 @@ from shift_simulator.table2 import EPISODES, RUNS
 from shift_simulator.users import PAPER_USERS, paper_user
 
 
-def users(seed: int, runs: int = RUNS, on_progress: OnProgress | None = None) -> dict[str, Any]:
+def users(
+    seed: int, runs: int = RUNS, on_progress: OnProgress | None = None, workers: int = 1, scheduler: str = ""
+) -> dict[str, Any]:
     """Return the break-even and reward of each user with and without the prior, the curves and the criterion.
 
     ``curves`` holds the data of the figure for each user and prior: the mean cumulative reward after each episode,
     and the band between the 10th and 90th percentile of the runs.
     """
     rows, curves = [], []
+    simulated = for_each(partial(_curves, seed=seed, runs=runs), PAPER_USERS, workers, scheduler)
     for done, name in enumerate(PAPER_USERS):
         if on_progress is not None:
             on_progress(done, len(PAPER_USERS))
-        for prior, cumulative in _curves(name, seed, runs).items():
+        for prior, cumulative in next(simulated).items():
             rows.append({"user": name, "prior": prior} | _summary(cumulative))
             curves.append({"user": name, "prior": prior} | _curve(cumulative))
     return {"seed": seed, "runs": runs, "users": rows, "criterion": users_criterion(rows), "curves": curves}

@@ -132,3 +132,23 @@ def test_recording_has_no_serious_finding_of_axe(open_tab, ended: dict[str, Any]
         tab.wait_text("events", "the session is ended")
         tab.page.wait_for_timeout(500)
         assert json.dumps(tab.serious_findings()) == "[]"
+
+
+def test_recording_is_decided_again_under_another_learner(tab: Tab, ended: dict[str, Any]) -> None:
+    tab.go("/recordings/rec1.mcap")
+    tab.click("whatif")
+    tab.page.get_by_text("Choose another study or another learner.").wait_for()
+    tab.page.locator("[data-testid=whatif-learner]").click()
+    tab.page.get_by_role("option", name="scoring", exact=True).click()
+    tab.click("whatif")
+    tab.wait_text("whatif-result", "of 2 decisions would have used another strategy")
+    rows = tab.page.locator("[data-testid=whatif-values] tbody tr")
+    rows.nth(3).wait_for()
+    assert [rows.nth(i).locator("th,td").first.inner_text() for i in range(4)] == [
+        "recorded", "IPS", "SNIPS", "doubly robust",
+    ]  # fmt: skip
+    suggested = [ended[name]["suggested"] for name in ("first", "second")]
+    counts = tab.text("whatif-counts")
+    for strategy in suggested:
+        assert " + ".join(strategy.values()).replace("_", " ") in counts
+    assert "participants: 1" in tab.text("whatif-warnings")

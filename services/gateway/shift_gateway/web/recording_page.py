@@ -32,6 +32,7 @@ from shift_gateway.web.room_elements import GazeSources, RoomElements, stimulus_
 from shift_gateway.web.room_view import room_view
 from shift_gateway.web.table_rows import Row
 from shift_gateway.web.verify_panel import VerifyPanel
+from shift_gateway.web.whatif_panel import WhatIfPanel
 from shift_gateway.web.wording import duration
 
 UPDATE_S = 0.2
@@ -61,11 +62,11 @@ def add_recording_page(gateway: Gateway) -> None:
                 ui.link("All recordings", "/recordings")
                 return
         await client.connected()
-        loading = asyncio.create_task(_load(path, main, heading))
+        loading = asyncio.create_task(_load(path, main, heading, gateway.settings.data / "studies"))
         client.on_delete(loading.cancel)
 
 
-async def _load(path: Path, main: ui.element, heading: ui.label) -> None:
+async def _load(path: Path, main: ui.element, heading: ui.label, studies: Path) -> None:
     """Read the recording with a progress bar, then show it."""
     with main:
         label = text("Reading the recording …", "muted").props('role="status"')
@@ -82,13 +83,15 @@ async def _load(path: Path, main: ui.element, heading: ui.label) -> None:
     bar.delete()
     heading.delete()
     with main:
-        RecordingPage(path, recording, excluded, *drawn)
+        RecordingPage(path, recording, excluded, *drawn, studies)
 
 
 class RecordingPage:
     """The elements of one open recording."""
 
-    def __init__(self, path: Path, recording: RecordingHistory, excluded: str, options: Any, rows: list[Row]) -> None:
+    def __init__(
+        self, path: Path, recording: RecordingHistory, excluded: str, options: Any, rows: list[Row], studies: Path
+    ) -> None:
         self._path = path
         self._recording = recording
         self._history = recording.history
@@ -104,6 +107,7 @@ class RecordingPage:
             ui.on(SEEK, lambda event: self._seek(event.args))
             self._show()
         VerifyPanel(path)
+        WhatIfPanel(path, studies)
 
     # --- the elements ---
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import datetime
 import os
-from collections.abc import Iterable, Mapping
+import pickle
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pyarrow as pa
 import pyarrow.csv
@@ -15,7 +17,7 @@ import pyarrow.parquet
 from shift_schemas.timestamps import NS
 
 from shift_recording.export.columns import Column
-from shift_recording.export.tables import Row
+from shift_recording.export.tables import Columns, Row
 
 BATCH = 20_000
 """Rows of a table that are written at once. A choice: a few megabytes."""
@@ -25,6 +27,7 @@ TYPES = {
 }  # fmt: skip
 
 
+@lru_cache(maxsize=1024)
 def iso_utc(ns: int) -> str:
     """Return a time as ISO 8601 in UTC with nanoseconds, such as ``2026-11-27T02:41:11.123456789Z``."""
     seconds = datetime.datetime.fromtimestamp(ns // NS, datetime.UTC)
@@ -39,9 +42,15 @@ def schema_of(columns: Iterable[Column], as_text: bool) -> pa.Schema:
 def batch_of(rows: list[Row], columns: Iterable[Column], as_text: bool) -> pa.Table:
     """Return rows as a table of pyarrow. A row's missing values are empty."""
     columns = tuple(columns)
+    values = {column.name: [row.get(column.name) for row in rows] for column in columns}
+    return table_of(values, len(rows), columns, as_text)
+
+
+def table_of(given: Columns, count: int, columns: tuple[Column, ...], as_text: bool) -> pa.Table:
+    """Return ``count`` rows that are given by column as a table of pyarrow. A missing column is empty."""
     data: list[list[Any]] = []
     for column in columns:
-        values = [row.get(column.name) for row in rows]
+        values = given.get(column.name) or [None] * count
         if as_text and column.type == "time":
             values = [None if ns is None else iso_utc(ns) for ns in values]
         data.append(values)
@@ -61,7 +70,6 @@ class TableFiles:
     def __init__(self, out: Path, kind: str, tables: Mapping[str, tuple[Column, ...]]) -> None:
         self.out, self.kind, self.tables = out, kind, tables
         self.counts = dict.fromkeys(tables, 0)
-        self._rows: dict[str, list[Row]] = {name: [] for name in tables}
         self._writers: dict[str, Any] = {}
         self._open = ExitStack()
 
@@ -78,36 +86,77 @@ class TableFiles:
 
     def __exit__(self, kind: object, *_: object) -> None:
         """Finish the files and give them their names; after an error, remove them."""
-        whole = False
-        try:
+        self._open.close()
+        for name in self.tables:
             if kind is None:
-                for name in self.tables:
-                    self._flush(name)
-                whole = True
-        finally:
-            self._open.close()
-            for name in self.tables:
-                if whole:
-                    os.replace(self._part(name), self.path(name))
-                else:
-                    self._part(name).unlink(missing_ok=True)
+                os.replace(self._part(name), self.path(name))
+            else:
+                self._part(name).unlink(missing_ok=True)
 
     def path(self, table: str) -> Path:
         """Return the path of a table's file."""
         return self.out / f"{table}.{self.kind}"
 
-    def add(self, table: str, row: Row) -> None:
-        """Add a row."""
-        rows = self._rows[table]
-        rows.append(row)
-        self.counts[table] += 1
-        if len(rows) >= BATCH:
-            self._flush(table)
+    def add(self, batch: Batch) -> None:
+        """Write a batch."""
+        self.counts[batch.table] += batch.rows.num_rows
+        self._writers[batch.table].write_table(batch.rows)
 
     def _part(self, table: str) -> Path:
         return self.out / f".{table}.{self.kind}.part"
 
-    def _flush(self, table: str) -> None:
-        rows, self._rows[table] = self._rows[table], []
-        if rows:
-            self._writers[table].write_table(batch_of(rows, self.tables[table], self.kind == "csv"))
+
+class Batch(NamedTuple):
+    """Rows of one table."""
+
+    table: str
+    rows: pa.Table
+
+
+def batches(rows: Iterable[tuple[str, Row | Columns]], tables: Mapping[str, tuple[Column, ...]], as_text: bool
+            ) -> Iterator[Batch]:  # fmt: skip
+    """Yield the rows of one recording in batches of at most about :data:`BATCH` rows; gaze is given by chunk."""
+    waiting: dict[str, list[Row]] = {name: [] for name in tables}
+    gaze, samples = Columns(), 0
+    for table, row in rows:
+        if table == "gaze":
+            n = len(row["t_s"])
+            for name, values in row.items():
+                gaze.setdefault(name, [None] * samples).extend(values)
+            samples += n
+            for name in gaze.keys() - row.keys():
+                gaze[name].extend([None] * n)
+            if samples >= BATCH:
+                yield Batch("gaze", table_of(gaze, samples, tables["gaze"], as_text))
+                gaze, samples = Columns(), 0
+            continue
+        waiting[table].append(row)
+        if len(waiting[table]) >= BATCH:
+            yield Batch(table, batch_of(waiting[table], tables[table], as_text))
+            waiting[table] = []
+    if samples:
+        yield Batch("gaze", table_of(gaze, samples, tables["gaze"], as_text))
+    for table, rest in waiting.items():
+        if rest:
+            yield Batch(table, batch_of(rest, tables[table], as_text))
+
+
+def store(found: Iterable[Batch], path: Path) -> None:
+    """Write batches to a temporary file, from which :func:`stored` reads them."""
+    with open(path, "wb") as file:
+        for batch in found:
+            with pa.BufferOutputStream() as sink:
+                with pa.ipc.new_stream(sink, batch.rows.schema) as writer:
+                    writer.write_table(batch.rows)
+                pickle.dump((batch.table, sink.getvalue().to_pybytes()), file)
+
+
+def stored(path: Path) -> Iterator[Batch]:
+    """Yield the batches of a file that :func:`store` wrote."""
+    with open(path, "rb") as file:
+        while True:
+            try:
+                table, data = pickle.load(file)
+            except EOFError:
+                return
+            yield Batch(table, pa.ipc.open_stream(data).read_all())

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 from shift_schemas.errors import InvalidSettings
@@ -13,14 +14,25 @@ from shift_schemas.messages import Session
 
 from shift_recording.durable_file import make_folder, write_durably
 from shift_recording.export.bids import BidsSession, Labels, Screen, write_data_set
+from shift_recording.export.columns import Column
 from shift_recording.export.dictionary import dictionary_csv
-from shift_recording.export.sources import OnProgress, Report, Sources, covariates_of, open_sources
+from shift_recording.export.sources import OneRecording, OnProgress, Report, Sources, covariates_of, open_sources
 from shift_recording.export.tables import Row, table_columns
 from shift_recording.export.vowpal_wabbit import line_of
+from shift_recording.parallel import for_each
 
 Format = Literal["csv", "parquet", "bids", "vw"]
 DICTIONARY = "data-dictionary.csv"
 EXTRA = "this needs pyarrow and pandas; install them with: pip install pyarrow pandas"
+
+
+@dataclass(frozen=True)
+class Way:
+    """How the work is done; see :func:`shift_recording.parallel.for_each`."""
+
+    workers: int = 1
+    scheduler: str = ""
+    on_progress: OnProgress | None = None
 
 
 @dataclass(frozen=True)
@@ -48,7 +60,7 @@ def export(
     covariates: Path | None = None,
     screen: Screen | None = None,
     with_excluded: bool = False,
-    on_progress: OnProgress | None = None,
+    way: Way = Way(),
 ) -> Exported:
     """Export recordings; a damaged one is reported, and the others go on.
 
@@ -60,6 +72,8 @@ def export(
         A CSV with a column ``participant``; its other columns become columns of ``sessions``.
     screen
         The screen's size in pixels, which BIDS needs.
+    way
+        How the work is done; BIDS and Vowpal Wabbit are written by one process.
 
     Raises
     ------
@@ -79,24 +93,54 @@ def export(
     make_folder(out)
     if to == "bids":
         assert screen is not None
-        return _bids(sources, out, screen, on_progress)
+        return _bids(sources, out, screen, way.on_progress)
     if to == "vw":
-        return _vowpal_wabbit(sources, out, on_progress)
-    return _tables(sources, to, out, on_progress)
+        return _vowpal_wabbit(sources, out, way.on_progress)
+    return _tables(sources, to, out, way)
 
 
-def _tables(sources: Sources, to: str, out: Path, on_progress: OnProgress | None) -> Exported:
+def _tables(sources: Sources, to: str, out: Path, way: Way) -> Exported:
     try:
-        from shift_recording.export.arrow_tables import TableFiles
+        from shift_recording.export.arrow_tables import TableFiles, stored
     except ImportError as e:
         raise InvalidSettings(EXTRA) from e
     tables = table_columns(sources.names, sources.covariate_names)
-    with TableFiles(out, to, tables) as files:
-        for table, row in sources.rows(on_progress):
-            files.add(table, row)
+    with TemporaryDirectory(dir=out, prefix=".parts-") as folder, TableFiles(out, to, tables) as files:
+        tasks = [
+            _Task(path, Path(folder) / f"{i}.part", sources.covariates, tables, to == "csv")
+            for i, path in enumerate(sources.files)
+        ]
+        for i, report in enumerate(for_each(_store_rows, tasks, way.workers, way.scheduler)):
+            sources.report.damaged |= report.damaged
+            for batch in stored(tasks[i].part):
+                files.add(batch)
+            tasks[i].part.unlink()
+            if way.on_progress is not None:
+                way.on_progress(i + 1, len(tasks))
     write_durably(out / DICTIONARY, dictionary_csv(tables).encode())
     paths = (*(files.path(table) for table in tables), out / DICTIONARY)
     return Exported(paths, files.counts, sources.report)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """One recording to read, and the temporary file for its rows."""
+
+    path: Path
+    part: Path
+    covariates: Mapping[str, Mapping[str, str]]
+    tables: Mapping[str, tuple[Column, ...]]
+    as_text: bool
+
+
+def _store_rows(task: _Task) -> Report:
+    """Write the rows of one recording to a temporary file; return what was damaged."""
+    from shift_recording.export.arrow_tables import batches, store
+
+    report = Report()
+    rows = OneRecording(task.path, report, task.covariates, gaze_by_chunk=True)
+    store(batches(rows, task.tables, task.as_text), task.part)
+    return report
 
 
 def _vowpal_wabbit(sources: Sources, out: Path, on_progress: OnProgress | None) -> Exported:

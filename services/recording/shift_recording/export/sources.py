@@ -40,8 +40,14 @@ class Report:
 class OneRecording:
     """The rows of one recording. Iterate over it once."""
 
-    def __init__(self, path: Path, report: Report, covariates: Mapping[str, Mapping[str, str]]) -> None:
-        self.rows = RecordingRows(path.name)
+    def __init__(
+        self,
+        path: Path,
+        report: Report,
+        covariates: Mapping[str, Mapping[str, str]],
+        gaze_by_chunk: bool = False,
+    ) -> None:
+        self.rows = RecordingRows(path.name, gaze_by_chunk)
         self._path, self._report, self._covariates = path, report, covariates
 
     def __iter__(self) -> Iterator[tuple[str, Row]]:

@@ -78,6 +78,8 @@ RESULT = ("comprehension_success", "comprehension_duration_s", "comprehension_va
           "enabledness_duration_s", "enabledness_value", "reward", "cumulative_reward")  # fmt: skip
 """What a decision's row repeats of its performance."""
 Row = dict[str, Any]
+Columns = dict[str, list[Any]]
+"""Several rows by column."""
 GAZE_VIEW = {column.name for column in columns_of(GazeView, Names(), "observation", "gaze_")} | {"gaze_category"}
 """The columns of what an observation says of gaze, without the weights."""
 
@@ -134,6 +136,8 @@ class RecordingRows:
     """
 
     file: str
+    gaze_by_chunk: bool = False
+    """Whether gaze is yielded as the columns of a chunk, which is faster, instead of one row for each sample."""
     session: Session | None = None
     study: Study | None = None
     """The study of the first configuration."""
@@ -160,7 +164,10 @@ class RecordingRows:
             self.study = self.study or study_from_json(fact.study)
             return
         if isinstance(fact, Gaze):
-            yield from (("gaze", row) for row in self._gaze_rows(fact))
+            if self.gaze_by_chunk:
+                yield "gaze", self.gaze_columns(fact)
+            else:
+                yield from (("gaze", row) for row in self._gaze_rows(fact))
             return
         table = TABLE_OF.get(fact.subject)
         if table is None:
@@ -195,16 +202,24 @@ class RecordingRows:
         return (ns - self.session.started.ns) / NS if self.session is not None else None
 
     def _gaze_rows(self, fact: Gaze) -> Iterator[Row]:
-        chunk = {
+        columns = self.gaze_columns(fact)
+        names = tuple(columns)
+        for values in zip(*columns.values(), strict=True):
+            yield dict(zip(names, values, strict=True))
+
+    def gaze_columns(self, fact: Gaze) -> Columns:
+        """Return the rows of a chunk of gaze as columns, each with one value for each sample."""
+        n, t = len(fact.t), fact.t
+        end_s = self._session_s(fact.stamp.ns)
+        same = {
             **self.keys(), "source": fact.source, "segment": fact.segment, "seq": fact.seq, "outcome": fact.outcome,
             "stamp_utc": fact.stamp.ns,
         }  # fmt: skip
-        end_s = self._session_s(fact.stamp.ns)
-        for i, t in enumerate(fact.t):
-            row = {**chunk, "sample": i, "t_s": t, "session_s": None if end_s is None else end_s - (fact.t[-1] - t)}
-            if fact.aoi:
-                row["aoi"] = fact.aoi[i]
-            else:
-                valid = fact.valid[i]
-                row |= {"x": fact.x[i] if valid else None, "y": fact.y[i] if valid else None, "valid": valid}
-            yield row
+        columns: Columns = {name: [value] * n for name, value in same.items()}
+        session_s = [None] * n if end_s is None else [end_s - (t[-1] - each) for each in t]
+        columns |= {"sample": list(range(n)), "t_s": t, "session_s": session_s}
+        if fact.aoi:
+            return columns | {"aoi": fact.aoi}
+        x = [value if ok else None for value, ok in zip(fact.x, fact.valid, strict=True)]
+        y = [value if ok else None for value, ok in zip(fact.y, fact.valid, strict=True)]
+        return columns | {"x": x, "y": y, "valid": fact.valid}
