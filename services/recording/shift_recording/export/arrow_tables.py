@@ -11,13 +11,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 from shift_schemas.timestamps import NS
 
 from shift_recording.export.columns import Column
-from shift_recording.export.tables import Columns, Row
+from shift_recording.export.tables import ChunkRows, Row
 
 BATCH = 20_000
 """Rows of a table that are written at once. A choice: a few megabytes."""
@@ -42,20 +43,54 @@ def schema_of(columns: Iterable[Column], as_text: bool) -> pa.Schema:
 def batch_of(rows: list[Row], columns: Iterable[Column], as_text: bool) -> pa.Table:
     """Return rows as a table of pyarrow. A row's missing values are empty."""
     columns = tuple(columns)
-    values = {column.name: [row.get(column.name) for row in rows] for column in columns}
-    return table_of(values, len(rows), columns, as_text)
-
-
-def table_of(given: Columns, count: int, columns: tuple[Column, ...], as_text: bool) -> pa.Table:
-    """Return ``count`` rows that are given by column as a table of pyarrow. A missing column is empty."""
-    data: list[list[Any]] = []
-    for column in columns:
-        values = given.get(column.name) or [None] * count
-        if as_text and column.type == "time":
-            values = [None if ns is None else iso_utc(ns) for ns in values]
-        data.append(values)
     schema = schema_of(columns, as_text)
-    return pa.table([pa.array(v, type=f.type) for v, f in zip(data, schema, strict=True)], schema=schema)
+    arrays = [
+        _array([row.get(c.name) for row in rows], c, f.type, as_text) for c, f in zip(columns, schema, strict=True)
+    ]
+    return pa.table(arrays, schema=schema)
+
+
+def _array(values: list[Any], column: Column, kind: pa.DataType, as_text: bool) -> pa.Array:
+    if as_text and column.type == "time":
+        values = [None if ns is None else iso_utc(ns) for ns in values]
+    return pa.array(values, type=kind)
+
+
+class GazeColumns:
+    """Chunks of gaze that become one batch: a value that all rows of a chunk have is kept once."""
+
+    def __init__(self, columns: tuple[Column, ...], as_text: bool) -> None:
+        self._columns = columns
+        self._as_text = as_text
+        self._counts: list[int] = []
+        self._same: list[Row] = []
+        self._each: dict[str, list[Any]] = {}
+        self.count = 0
+
+    def add(self, chunk: ChunkRows) -> None:
+        """Add a chunk."""
+        for name, values in chunk.each.items():
+            if name not in self._each:
+                self._each[name] = [None] * self.count
+            self._each[name].extend(values)
+        self.count += chunk.samples
+        for name in self._each.keys() - chunk.each.keys():
+            self._each[name].extend([None] * chunk.samples)
+        self._counts.append(chunk.samples)
+        self._same.append(chunk.same)
+
+    def table(self) -> pa.Table:
+        """Return the rows as a table of pyarrow."""
+        schema = schema_of(self._columns, self._as_text)
+        chunk_of = pa.array(np.repeat(np.arange(len(self._counts)), self._counts))
+        arrays = []
+        for column, field in zip(self._columns, schema, strict=True):
+            if column.name in self._each:
+                arrays.append(_array(self._each[column.name], column, field.type, self._as_text))
+            else:
+                same = _array([row.get(column.name) for row in self._same], column, field.type, self._as_text)
+                arrays.append(same.take(chunk_of))
+        return pa.table(arrays, schema=schema)
 
 
 class TableFiles:
@@ -113,29 +148,25 @@ class Batch(NamedTuple):
     rows: pa.Table
 
 
-def batches(rows: Iterable[tuple[str, Row | Columns]], tables: Mapping[str, tuple[Column, ...]], as_text: bool
-            ) -> Iterator[Batch]:  # fmt: skip
-    """Yield the rows of one recording in batches of at most about :data:`BATCH` rows; gaze is given by chunk."""
+def batches(
+    rows: Iterable[tuple[str, Row]], tables: Mapping[str, tuple[Column, ...]], as_text: bool
+) -> Iterator[Batch]:
+    """Yield the rows of one recording in batches of about :data:`BATCH` rows; gaze is given by chunk."""
     waiting: dict[str, list[Row]] = {name: [] for name in tables}
-    gaze, samples = Columns(), 0
+    gaze = GazeColumns(tables["gaze"], as_text)
     for table, row in rows:
         if table == "gaze":
-            n = len(row["t_s"])
-            for name, values in row.items():
-                gaze.setdefault(name, [None] * samples).extend(values)
-            samples += n
-            for name in gaze.keys() - row.keys():
-                gaze[name].extend([None] * n)
-            if samples >= BATCH:
-                yield Batch("gaze", table_of(gaze, samples, tables["gaze"], as_text))
-                gaze, samples = Columns(), 0
+            gaze.add(ChunkRows(**row))
+            if gaze.count >= BATCH:
+                yield Batch("gaze", gaze.table())
+                gaze = GazeColumns(tables["gaze"], as_text)
             continue
         waiting[table].append(row)
         if len(waiting[table]) >= BATCH:
             yield Batch(table, batch_of(waiting[table], tables[table], as_text))
             waiting[table] = []
-    if samples:
-        yield Batch("gaze", table_of(gaze, samples, tables["gaze"], as_text))
+    if gaze.count:
+        yield Batch("gaze", gaze.table())
     for table, rest in waiting.items():
         if rest:
             yield Batch(table, batch_of(rest, tables[table], as_text))

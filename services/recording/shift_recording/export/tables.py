@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from shift_schemas.messages import (
     Clock,
@@ -78,8 +78,18 @@ RESULT = ("comprehension_success", "comprehension_duration_s", "comprehension_va
           "enabledness_duration_s", "enabledness_value", "reward", "cumulative_reward")  # fmt: skip
 """What a decision's row repeats of its performance."""
 Row = dict[str, Any]
-Columns = dict[str, list[Any]]
-"""Several rows by column."""
+
+
+class ChunkRows(NamedTuple):
+    """The rows of a chunk of gaze by column."""
+
+    samples: int
+    same: Row
+    """The values that all of its rows have."""
+    each: dict[str, list[Any]]
+    """One value for each row."""
+
+
 GAZE_VIEW = {column.name for column in columns_of(GazeView, Names(), "observation", "gaze_")} | {"gaze_category"}
 """The columns of what an observation says of gaze, without the weights."""
 
@@ -165,7 +175,7 @@ class RecordingRows:
             return
         if isinstance(fact, Gaze):
             if self.gaze_by_chunk:
-                yield "gaze", self.gaze_columns(fact)
+                yield "gaze", self.gaze_chunk(fact)._asdict()
             else:
                 yield from (("gaze", row) for row in self._gaze_rows(fact))
             return
@@ -202,24 +212,25 @@ class RecordingRows:
         return (ns - self.session.started.ns) / NS if self.session is not None else None
 
     def _gaze_rows(self, fact: Gaze) -> Iterator[Row]:
-        columns = self.gaze_columns(fact)
-        names = tuple(columns)
-        for values in zip(*columns.values(), strict=True):
-            yield dict(zip(names, values, strict=True))
+        chunk = self.gaze_chunk(fact)
+        names = tuple(chunk.each)
+        for values in zip(*chunk.each.values(), strict=True):
+            yield {**chunk.same, **dict(zip(names, values, strict=True))}
 
-    def gaze_columns(self, fact: Gaze) -> Columns:
-        """Return the rows of a chunk of gaze as columns, each with one value for each sample."""
+    def gaze_chunk(self, fact: Gaze) -> ChunkRows:
+        """Return the rows of a chunk of gaze by column."""
         n, t = len(fact.t), fact.t
         end_s = self._session_s(fact.stamp.ns)
         same = {
             **self.keys(), "source": fact.source, "segment": fact.segment, "seq": fact.seq, "outcome": fact.outcome,
             "stamp_utc": fact.stamp.ns,
         }  # fmt: skip
-        columns: Columns = {name: [value] * n for name, value in same.items()}
         session_s = [None] * n if end_s is None else [end_s - (t[-1] - each) for each in t]
-        columns |= {"sample": list(range(n)), "t_s": t, "session_s": session_s}
+        each: dict[str, list[Any]] = {"sample": list(range(n)), "t_s": t, "session_s": session_s}
         if fact.aoi:
-            return columns | {"aoi": fact.aoi}
-        x = [value if ok else None for value, ok in zip(fact.x, fact.valid, strict=True)]
-        y = [value if ok else None for value, ok in zip(fact.y, fact.valid, strict=True)]
-        return columns | {"x": x, "y": y, "valid": fact.valid}
+            return ChunkRows(n, same, {**each, "aoi": fact.aoi})
+        x, y, valid = fact.x, fact.y, fact.valid
+        if not all(valid):
+            x = [value if ok else None for value, ok in zip(x, valid, strict=True)]  # type: ignore[misc]
+            y = [value if ok else None for value, ok in zip(y, valid, strict=True)]  # type: ignore[misc]
+        return ChunkRows(n, same, {**each, "x": x, "y": y, "valid": valid})
