@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import datetime
 import os
 import pickle
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,10 +13,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
-from shift_schemas.timestamps import NS
 
 from shift_recording.export.columns import Column
-from shift_recording.export.tables import ChunkRows, Row
+from shift_recording.export.tables import GazeChunkRow, Row
 
 BATCH = 20_000
 """Rows of a table that are written at once. A choice: a few megabytes."""
@@ -28,11 +25,10 @@ TYPES = {
 }  # fmt: skip
 
 
-@lru_cache(maxsize=1024)
-def iso_utc(ns: int) -> str:
-    """Return a time as ISO 8601 in UTC with nanoseconds, such as ``2026-11-27T02:41:11.123456789Z``."""
-    seconds = datetime.datetime.fromtimestamp(ns // NS, datetime.UTC)
-    return f"{seconds:%Y-%m-%dT%H:%M:%S}.{ns % NS:09}Z"
+def iso_utc(ns: Sequence[int]) -> list[str]:
+    """Return times as ISO 8601 in UTC with nanoseconds, such as ``2026-11-27T02:41:11.123456789Z``."""
+    texts = np.datetime_as_string(np.asarray(ns, dtype="datetime64[ns]"), unit="ns")
+    return [f"{text}Z" for text in texts.tolist()]
 
 
 def schema_of(columns: Iterable[Column], as_text: bool) -> pa.Schema:
@@ -52,45 +48,75 @@ def batch_of(rows: list[Row], columns: Iterable[Column], as_text: bool) -> pa.Ta
 
 def _array(values: list[Any], column: Column, kind: pa.DataType, as_text: bool) -> pa.Array:
     if as_text and column.type == "time":
-        values = [None if ns is None else iso_utc(ns) for ns in values]
+        texts = iter(iso_utc([ns for ns in values if ns is not None]))
+        values = [None if ns is None else next(texts) for ns in values]
     return pa.array(values, type=kind)
 
 
-class GazeColumns:
-    """Chunks of gaze that become one batch: a value that all rows of a chunk have is kept once."""
+class GazeRows:
+    """Chunks of gaze that become one batch of rows, one for each sample.
+
+    Only flat lists of numbers and texts are kept: objects that stay alive make Python's garbage collection slow.
+    """
 
     def __init__(self, columns: tuple[Column, ...], as_text: bool) -> None:
         self._columns = columns
         self._as_text = as_text
+        self._same: dict[str, list[Any]] = {}
+        """One value for each chunk."""
+        self._each: dict[str, list[Any]] = {name: [] for name in ("t_s", "x", "y", "valid", "aoi")}
+        """One value for each sample."""
         self._counts: list[int] = []
-        self._same: list[Row] = []
-        self._each: dict[str, list[Any]] = {}
-        self.count = 0
+        self._ends: list[float] = []
+        self._named: list[bool] = []
+        self.samples = 0
 
-    def add(self, chunk: ChunkRows) -> None:
+    def add(self, chunk: GazeChunkRow) -> None:
         """Add a chunk."""
-        for name, values in chunk.each.items():
-            if name not in self._each:
-                self._each[name] = [None] * self.count
-            self._each[name].extend(values)
-        self.count += chunk.samples
-        for name in self._each.keys() - chunk.each.keys():
-            self._each[name].extend([None] * chunk.samples)
-        self._counts.append(chunk.samples)
-        self._same.append(chunk.same)
+        fact, count = chunk.fact, len(chunk.fact.t)
+        for name, value in chunk.same.items():
+            self._same.setdefault(name, []).append(value)
+        each = self._each
+        each["t_s"].extend(fact.t)
+        each["x"].extend(fact.x or fact.t)
+        each["y"].extend(fact.y or fact.t)
+        each["valid"].extend(fact.valid or [False] * count)
+        each["aoi"].extend(fact.aoi or [None] * count)
+        self._counts.append(count)
+        self._ends.append(np.nan if chunk.session_s is None else chunk.session_s)
+        self._named.append(bool(fact.aoi))
+        self.samples += count
 
     def table(self) -> pa.Table:
         """Return the rows as a table of pyarrow."""
         schema = schema_of(self._columns, self._as_text)
         chunk_of = pa.array(np.repeat(np.arange(len(self._counts)), self._counts))
+        each = self._varying()
         arrays = []
         for column, field in zip(self._columns, schema, strict=True):
-            if column.name in self._each:
-                arrays.append(_array(self._each[column.name], column, field.type, self._as_text))
+            if column.name in each:
+                arrays.append(each[column.name].cast(field.type))
             else:
-                same = _array([row.get(column.name) for row in self._same], column, field.type, self._as_text)
-                arrays.append(same.take(chunk_of))
+                same = self._same.get(column.name, [None] * len(self._counts))
+                arrays.append(_array(same, column, field.type, self._as_text).take(chunk_of))
         return pa.table(arrays, schema=schema)
+
+    def _varying(self) -> dict[str, pa.Array]:
+        """Return the columns that differ within a chunk."""
+        counts = np.array(self._counts)
+        ends = np.cumsum(counts)
+        t = np.array(self._each["t_s"], dtype=float)
+        last = np.repeat(t[ends - 1], counts)
+        end, named = np.repeat(self._ends, counts), np.repeat(self._named, counts)
+        valid = np.array(self._each["valid"], dtype=bool)
+        lost = named | ~valid
+        return {
+            "sample": pa.array(np.arange(self.samples) - np.repeat(ends - counts, counts)),
+            "t_s": pa.array(t), "session_s": pa.array(end - (last - t), mask=np.isnan(end)),
+            "x": pa.array(np.array(self._each["x"], dtype=float), mask=lost),
+            "y": pa.array(np.array(self._each["y"], dtype=float), mask=lost),
+            "valid": pa.array(valid, mask=named), "aoi": pa.array(self._each["aoi"], type=pa.string()),
+        }  # fmt: skip
 
 
 class TableFiles:
@@ -153,19 +179,19 @@ def batches(
 ) -> Iterator[Batch]:
     """Yield the rows of one recording in batches of about :data:`BATCH` rows; gaze is given by chunk."""
     waiting: dict[str, list[Row]] = {name: [] for name in tables}
-    gaze = GazeColumns(tables["gaze"], as_text)
+    gaze = GazeRows(tables["gaze"], as_text)
     for table, row in rows:
         if table == "gaze":
-            gaze.add(ChunkRows(**row))
-            if gaze.count >= BATCH:
+            gaze.add(row["chunk"])
+            if gaze.samples >= BATCH:
                 yield Batch("gaze", gaze.table())
-                gaze = GazeColumns(tables["gaze"], as_text)
+                gaze = GazeRows(tables["gaze"], as_text)
             continue
         waiting[table].append(row)
         if len(waiting[table]) >= BATCH:
             yield Batch(table, batch_of(waiting[table], tables[table], as_text))
             waiting[table] = []
-    if gaze.count:
+    if gaze.samples:
         yield Batch("gaze", gaze.table())
     for table, rest in waiting.items():
         if rest:

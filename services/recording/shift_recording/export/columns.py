@@ -9,6 +9,7 @@ from __future__ import annotations
 import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
@@ -118,15 +119,22 @@ def _bare(annotation: Any) -> Any:
 def values_of(message: BaseModel, prefix: str = "") -> dict[str, Any]:
     """Return a message's values by column; texts of a list are joined with ``" | "``."""
     found: dict[str, Any] = {}
-    for name in type(message).model_fields:
-        if not prefix and name in ("session", "seen", "required", "actions"):
-            continue
-        _put(found, short(prefix + name), getattr(message, name))
+    for name, column in _fields(type(message), prefix):
+        _put(found, column, getattr(message, name))
     return found
 
 
+@cache
+def _fields(kind: type[BaseModel], prefix: str) -> tuple[tuple[str, str], ...]:
+    """Return the fields of a message, each with the name of its column."""
+    left_out = () if prefix else ("session", "seen", "required", "actions")
+    return tuple((name, short(prefix + name)) for name in kind.model_fields if name not in left_out)
+
+
 def _put(found: dict[str, Any], name: str, value: Any) -> None:
-    if isinstance(value, Stamp):
+    if value is None or type(value) in PLAIN:
+        found[name] = value
+    elif isinstance(value, Stamp):
         found[f"{name}_utc"] = value.ns
     elif isinstance(value, BaseModel) and not isinstance(value, Seen):
         found.update(values_of(value, f"{name}_"))

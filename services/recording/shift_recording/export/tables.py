@@ -80,14 +80,14 @@ RESULT = ("comprehension_success", "comprehension_duration_s", "comprehension_va
 Row = dict[str, Any]
 
 
-class ChunkRows(NamedTuple):
-    """The rows of a chunk of gaze by column."""
+class GazeChunkRow(NamedTuple):
+    """A chunk of gaze whose samples become rows."""
 
-    samples: int
+    fact: Gaze
     same: Row
     """The values that all of its rows have."""
-    each: dict[str, list[Any]]
-    """One value for each row."""
+    session_s: float | None
+    """When the chunk was applied, s since the session's start."""
 
 
 GAZE_VIEW = {column.name for column in columns_of(GazeView, Names(), "observation", "gaze_")} | {"gaze_category"}
@@ -175,7 +175,7 @@ class RecordingRows:
             return
         if isinstance(fact, Gaze):
             if self.gaze_by_chunk:
-                yield "gaze", self.gaze_chunk(fact)._asdict()
+                yield "gaze", self._gaze_chunk(fact)
             else:
                 yield from (("gaze", row) for row in self._gaze_rows(fact))
             return
@@ -212,25 +212,23 @@ class RecordingRows:
         return (ns - self.session.started.ns) / NS if self.session is not None else None
 
     def _gaze_rows(self, fact: Gaze) -> Iterator[Row]:
-        chunk = self.gaze_chunk(fact)
-        names = tuple(chunk.each)
-        for values in zip(*chunk.each.values(), strict=True):
-            yield {**chunk.same, **dict(zip(names, values, strict=True))}
+        same, end_s = self.gaze_keys(fact), self._session_s(fact.stamp.ns)
+        for i, t in enumerate(fact.t):
+            row = {**same, "sample": i, "t_s": t, "session_s": None if end_s is None else end_s - (fact.t[-1] - t)}
+            if fact.aoi:
+                row["aoi"] = fact.aoi[i]
+            else:
+                valid = fact.valid[i]
+                row |= {"x": fact.x[i] if valid else None, "y": fact.y[i] if valid else None, "valid": valid}
+            yield row
 
-    def gaze_chunk(self, fact: Gaze) -> ChunkRows:
-        """Return the rows of a chunk of gaze by column."""
-        n, t = len(fact.t), fact.t
-        end_s = self._session_s(fact.stamp.ns)
-        same = {
+    def gaze_keys(self, fact: Gaze) -> Row:
+        """Return the values that all samples of a chunk of gaze have."""
+        return {
             **self.keys(), "source": fact.source, "segment": fact.segment, "seq": fact.seq, "outcome": fact.outcome,
             "stamp_utc": fact.stamp.ns,
         }  # fmt: skip
-        session_s = [None] * n if end_s is None else [end_s - (t[-1] - each) for each in t]
-        each: dict[str, list[Any]] = {"sample": list(range(n)), "t_s": t, "session_s": session_s}
-        if fact.aoi:
-            return ChunkRows(n, same, {**each, "aoi": fact.aoi})
-        x, y, valid = fact.x, fact.y, fact.valid
-        if not all(valid):
-            x = [value if ok else None for value, ok in zip(x, valid, strict=True)]  # type: ignore[misc]
-            y = [value if ok else None for value, ok in zip(y, valid, strict=True)]  # type: ignore[misc]
-        return ChunkRows(n, same, {**each, "x": x, "y": y, "valid": valid})
+
+    def _gaze_chunk(self, fact: Gaze) -> Row:
+        """Return a chunk of gaze as it is: its samples become rows later, many chunks at once."""
+        return {"chunk": GazeChunkRow(fact, self.gaze_keys(fact), self._session_s(fact.stamp.ns))}
