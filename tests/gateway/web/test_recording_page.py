@@ -152,3 +152,5 @@ def test_recording_is_decided_again_under_another_learner(tab: Tab, ended: dict[
     for strategy in suggested:
         assert " + ".join(strategy.values()).replace("_", " ") in counts
     assert "participants: 1" in tab.text("whatif-warnings")
+    tab.page.locator("[data-testid=whatif-chart] svg").wait_for()
+    assert "doubly robust" in tab.text("whatif-chart")

@@ -46,6 +46,7 @@ class WhatIfPanel:
                 "whatif-counts", "States and strategies", ("state or strategy", "recorded", "other")
             )
             self._warnings = text("", "warning", "whatif-warnings")
+            self._figure = ui.element("div")
         ui.context.client.on_delete(self._stop)
 
     def _select(self, label: str, names: object, name: str) -> ui.select:
@@ -82,5 +83,9 @@ class WhatIfPanel:
     def _show(self, result: WhatIfResult) -> None:
         self._result.text = result.sentence
         self._warnings.text = " ".join(f"Note: {warning}." for warning in result.warnings)
+        self._figure.clear()
+        with self._figure:
+            chart = ui.echart(result.chart, renderer="svg").style(f"height: {result.chart['height']}px; width: 100%")
+            testid(chart, "whatif-chart")
         with self._result:
             ui.run_javascript(self._values.script(result.values) + self._counts.script(result.counts))
