@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from shift_cli.recording_options import Files, Json, Scheduler, Workers
+from shift_cli.screen_option import pixels_of
 
 if TYPE_CHECKING:
     from shift_recording.export.bids import Screen
@@ -75,10 +75,10 @@ def _screen(text: str) -> Screen | None:
 
     if not text:
         return None
-    match = re.fullmatch(r"\s*(\d{1,5})\s*[xX×]\s*(\d{1,5})\s*", text)
-    if match is None or not int(match[1]) or not int(match[2]):
+    size = pixels_of(text)
+    if size is None:
         raise InvalidSettings(f"--screen is {text!r}: write width and height in pixels, such as 1920x1080")
-    return Screen(int(match[1]), int(match[2]))
+    return Screen(*size)
 
 
 def _show(done: Exported, out: Path) -> None:

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from shift_cli.screen_option import pixels_of
+
 if TYPE_CHECKING:
     from shift_runtime.rest_client import RestClient
     from shift_sources.files.samples import Sample
+    from shift_sources.files.table import ScreenSize
 
 app = typer.Typer(no_args_is_help=True, help="Gaze recordings.")
 PIECE_S = 0.05
@@ -27,7 +30,7 @@ def _gaze() -> None:
 
 @app.command()
 def play(
-    file: Annotated[Path, typer.Argument(help="Tobii TX300 or Titta table (TSV), or its gzip.", envvar="SHIFT_FILE")],
+    file: Annotated[Path, typer.Argument(help="A gaze file; gaze formats lists what is read.", envvar="SHIFT_FILE")],
     session: Annotated[str, typer.Option(help="The session to stream into.", envvar="SHIFT_SESSION")],
     speed: Annotated[
         float, typer.Option("--speed", "--rate", help="Times real time.", envvar="SHIFT_SPEED", min=0.01, max=1000)
@@ -36,6 +39,13 @@ def play(
     source: Annotated[
         str | None, typer.Option(help="Name of the gaze source; left out: one of its own.", envvar="SHIFT_SOURCE")
     ] = None,
+    screen: Annotated[
+        str, typer.Option(help="Size in pixels, for files with pixels: 1920x1080.", envvar="SHIFT_SCREEN")
+    ] = "",
+    format_: Annotated[
+        str,
+        typer.Option("--format", help="Insist on this format; left out: by the content.", envvar="SHIFT_FORMAT"),
+    ] = "",
 ) -> None:
     """Stream a recording of an eye tracker into a session, with its own timing.
 
@@ -45,6 +55,7 @@ def play(
     \b
     shift-mesh gaze play trial1.tsv.gz --session s1
     shift-mesh gaze play trial1.tsv.gz --session s1 --speed 20
+    shift-mesh gaze play gaze.csv --session s1 --screen 1600x1200
     """
     from shift_runtime.rest_client import RestClient
     from shift_schemas.errors import MalformedMessage, check_id
@@ -52,7 +63,7 @@ def play(
 
     if source is not None:
         check_id("--source", source)
-    found = list(read_samples(file))
+    found = list(read_samples(file, _screen(screen), format_))
     if not found:
         raise MalformedMessage(f"{file.name} holds no samples")
     with RestClient(url) as shift:
@@ -66,6 +77,40 @@ def play(
     if why := _nothing_counted(said, before, after):
         typer.echo(f"nothing of this gaze counted: {why}", err=True)
         raise typer.Exit(1)
+
+
+@app.command()
+def formats(
+    as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
+) -> None:
+    """List the formats of gaze files that are read, with the columns by which they are recognised.
+
+    \b
+    shift-mesh gaze formats
+    shift-mesh gaze formats --json
+    """
+    import json
+
+    from shift_sources.files.formats import ABOUT
+
+    if as_json:
+        typer.echo(json.dumps({"formats": ABOUT}, ensure_ascii=False))
+        return
+    for name, about in ABOUT.items():
+        typer.echo(f"{name:14} {about}")
+
+
+def _screen(text: str) -> ScreenSize | None:
+    """Return the size of ``--screen``. Raise :class:`InvalidSettings` for a text that is not one."""
+    from shift_schemas.errors import InvalidSettings
+    from shift_sources.files.table import ScreenSize
+
+    if not text:
+        return None
+    size = pixels_of(text)
+    if size is None:
+        raise InvalidSettings(f"--screen is {text!r}: write width and height in pixels, such as 1920x1080")
+    return ScreenSize(*size)
 
 
 class Described(NamedTuple):

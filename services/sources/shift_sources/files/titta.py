@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import partial
 
 from shift_sources.files.samples import Sample, sample_of_eyes
-from shift_sources.files.table import Row, TableFormat
+from shift_sources.files.table import Row, TableFormat, is_table
 
 YES, NO = frozenset({"true", "1", "1.0"}), frozenset({"false", "0", "0.0", ""})
 Eye = tuple[str, str, str]
@@ -38,8 +38,10 @@ def _format(time_column: str, validity: str) -> TableFormat:
     return TableFormat("Titta", time_column, (time_column, *left, *right), partial(_sample, eyes=(left, right)))
 
 
-FORMATS = tuple(
-    _format(time_column, validity)
-    for time_column in ("device_time_stamp", "system_time_stamp")
-    for validity in ("gaze_point_valid", "gaze_point_validity")
-)
+FORMATS = {
+    "titta": tuple(
+        is_table(_format(time_column, validity))
+        for time_column in ("device_time_stamp", "system_time_stamp")
+        for validity in ("gaze_point_valid", "gaze_point_validity")
+    )
+}

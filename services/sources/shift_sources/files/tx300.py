@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from shift_sources.files.samples import Sample, sample_of_eyes
-from shift_sources.files.table import Row, TableFormat
+from shift_sources.files.table import Row, TableFormat, is_table
 
 LOST = -1.0
 """What a TX300 writes for a lost coordinate."""
@@ -29,4 +29,6 @@ def _is_certain(row: Row, column: str) -> bool:
     return value is not None and value <= LARGEST_VALIDITY
 
 
-FORMATS = (TableFormat("Tobii TX300", "Time", ("Time", *(c for eye in EYES for c in eye)), _sample),)
+FORMATS = {
+    "tx300": (is_table(TableFormat("Tobii TX300", "Time", ("Time", *(c for eye in EYES for c in eye)), _sample)),)
+}
