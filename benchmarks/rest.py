@@ -18,7 +18,8 @@ from pathlib import Path
 import httpx
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
-from support.whole_mesh import free_port, running_mesh
+from support.free_ports import free_port
+from support.whole_mesh import running_mesh
 
 ROUNDS = 400
 BARE = """

@@ -29,7 +29,8 @@ from rich.table import Table
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from rest import BARE
-from support.whole_mesh import free_port, running_mesh
+from support.free_ports import free_port
+from support.whole_mesh import running_mesh
 
 Request = tuple[str, str, Any]
 """Method, path and body."""

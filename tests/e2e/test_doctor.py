@@ -13,7 +13,8 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
-from support.whole_mesh import LiveMesh, free_port
+from support.free_ports import free_port
+from support.whole_mesh import LiveMesh
 
 SERVICES = {"recorder", "monitor", "decider", "learner", "gateway"}
 

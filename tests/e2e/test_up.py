@@ -16,8 +16,9 @@ from shift_cli.supervisor import STEADY_S
 from shift_runtime.rest_client import RestClient
 from shift_simulator.live import drive
 from shift_simulator.users import paper_user
+from support.free_ports import free_port
 from support.interactions import essence, expected, read_recording
-from support.whole_mesh import LiveMesh, free_port, running_mesh
+from support.whole_mesh import LiveMesh, running_mesh
 
 PACKAGES = ("monitor", "decider", "learner", "recorder", "gateway", "runtime.router")
 STUDY = {"study": "lives", "interactions": 100, "decider": {"wait_s": 30}}

@@ -17,9 +17,10 @@ from shift_runtime.rest_client import RestClient
 from shift_schemas.errors import Unavailable
 from shift_simulator.live import LiveEpisode, drive
 from shift_simulator.users import paper_user
+from support.free_ports import free_port
 from support.interactions import STUDY, check_recording, essences, expected, interact, played
 from support.small_disk import AS_ROOT, fill, small_disk
-from support.whole_mesh import READY_WITHIN_S, LiveMesh, free_port, running_mesh
+from support.whole_mesh import READY_WITHIN_S, LiveMesh, running_mesh
 
 SERVICES = ("gateway", "learner", "decider", "monitor", "recorder")
 

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import httpx
 import pytest
+from support.free_ports import free_port
 from support.suspension import begin, check, suspend
-from support.whole_mesh import LiveMesh, free_port, running_mesh
+from support.whole_mesh import LiveMesh, running_mesh
 
 
 @pytest.fixture(scope="module")

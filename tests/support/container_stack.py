@@ -10,7 +10,6 @@ import json
 import os
 import secrets
 import shutil
-import socket
 import subprocess
 import time
 from dataclasses import dataclass, field
@@ -18,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from support.free_ports import free_port
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVICES = ("router", "recorder", "monitor", "decider", "learner", "gateway", "simulator")
@@ -58,12 +59,6 @@ def why_no_engine() -> str | None:
     if os.environ.get("CI") == "true":
         pytest.fail(f"{reason}; with CI=true it has to be")
     return reason
-
-
-def free_port() -> int:
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return int(s.getsockname()[1])
 
 
 @dataclass

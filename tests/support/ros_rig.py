@@ -15,8 +15,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from support.free_ports import free_port
 from support.ros_environments import PACKAGES, ROOT, python_of, work_folder
-from support.whole_mesh import free_port
 
 READY_WITHIN_S = 40.0
 HERE = Path(__file__).parent / "ros_peers"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import socket
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -12,15 +11,15 @@ from shift_runtime.bus.protocol import Bus
 from shift_schemas.messages import Marker, OutboxRow
 from shift_schemas.timestamps import Stamp
 
+from support.free_ports import free_port
+
 SOON_S = 10.0
 """A test that waits so long has failed."""
 
 
 def free_endpoint() -> str:
     """Return an endpoint on which nobody listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 async def until(there: Callable[[], Any]) -> None:

@@ -95,6 +95,9 @@ async def test_room_view_shows_the_last_decision_and_the_missing_result(own_mesh
         await session.done("override", {"task": "turn", "strategy": NEGATED})
         history = await histories.open(session.name)
         now = own_mesh.clock.now().ns
+        async with asyncio.timeout(HANG_LIMIT_S):
+            while not room_view(history, now).overrides:  # noqa: ASYNC110 - a history has no event
+                await asyncio.sleep(0.005)
         before = room_view(history, now)
         assert (before.decision_number, before.say, before.overrides) == (
             "0", "no decision yet", {"turn": "negation"}
