@@ -18,8 +18,8 @@ from typing import Any
 from mcap.reader import make_reader
 from rich.console import Console
 from rich.table import Table
-from shift_recording.export.bids import Screen
 from shift_recording.export.export import export
+from shift_recording.export.screen import Screen
 from shift_recording.mcap.reader import facts
 from shift_schemas.messages import GazeChunk
 

@@ -12,8 +12,8 @@ from shift_cli.recording_options import Files, Json, Scheduler, Workers
 from shift_cli.screen_option import pixels_of
 
 if TYPE_CHECKING:
-    from shift_recording.export.bids import Screen
     from shift_recording.export.export import Exported
+    from shift_recording.export.screen import Screen
 
 
 def export(
@@ -70,7 +70,7 @@ def export(
 
 
 def _screen(text: str) -> Screen | None:
-    from shift_recording.export.bids import Screen
+    from shift_recording.export.screen import Screen
     from shift_schemas.errors import InvalidSettings
 
     if not text:

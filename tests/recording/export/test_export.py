@@ -17,8 +17,8 @@ import pytest
 import shift_recording
 import vowpalwabbit
 from shift_recording.exclusion import ExclusionEntry, add_entry
-from shift_recording.export.bids import Screen
 from shift_recording.export.export import Exported, export
+from shift_recording.export.screen import Screen
 from shift_recording.mcap.reader import facts
 from shift_schemas.errors import DamagedRecording, InvalidSettings, MalformedMessage, UnknownThing
 from shift_schemas.messages import Decision, Gaze, Performance

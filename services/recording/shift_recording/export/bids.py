@@ -14,9 +14,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv
 from shift_study.study import Study
 
 from shift_recording.durable_file import write_durably
+from shift_recording.export.screen import Screen
 from shift_recording.export.tables import Row
 
 VERSION = "1.11.0"
@@ -46,17 +50,11 @@ EVENTS = {
     "reward": ("", "The reward of the performance."),
     "text": ("", "The marker's text."),
 }
+GZIP_LEVEL = 2
+"""Measured with gaze at 300 Hz: 20 times as fast as Python's own choice of 9, and files 14 % larger."""
 MOST_INTERVALS = 10_000
 """The sampling frequency is that of the median of so many intervals at most."""
 _NOT_IN_LABEL = re.compile(r"[^0-9a-zA-Z]")
-
-
-@dataclass(frozen=True)
-class Screen:
-    """The size of the screen in pixels."""
-
-    width: int
-    height: int
 
 
 @dataclass
@@ -87,18 +85,30 @@ class GazeFile:
         self._intervals: list[float] = []
         self._start_s: float | None = None
         self._raw = open(stem.with_name(f"{stem.name}_physio.tsv.gz"), "wb")  # noqa: SIM115 (closed by close)
-        self._file = gzip.GzipFile("", "wb", fileobj=self._raw, mtime=0)
+        self._file = gzip.GzipFile("", "wb", GZIP_LEVEL, fileobj=self._raw, mtime=0)
 
-    def add(self, row: Row) -> None:
-        """Append a sample."""
+    def add(self, rows: pa.Table) -> None:
+        """Append samples: rows of the table ``gaze``."""
         if self._start_s is None:
-            self._start_s = row["session_s"]
-        if self._previous is not None and self._previous[0] == row["segment"] and len(self._intervals) < MOST_INTERVALS:
-            self._intervals.append(row["t_s"] - self._previous[1])
-        self._previous = row["segment"], row["t_s"]
-        x, y = _pixels(row, self._screen)
-        self._file.write(_line((row["t_s"], x, y, row["session_s"])))
-        self.samples += 1
+            self._start_s = rows["session_s"][0].as_py()
+        self._add_intervals(rows)
+        pixels = [pc.multiply(rows["x"], float(self._screen.width)), pc.multiply(rows["y"], float(self._screen.height))]
+        columns = [rows["t_s"], *pixels, rows["session_s"]]
+        texts = [pc.fill_null(column.cast(pa.string()), "n/a") for column in columns]
+        pyarrow.csv.write_csv(
+            pa.table(texts, names=list(PHYSIO)),
+            self._file,
+            pyarrow.csv.WriteOptions(include_header=False, delimiter="\t", quoting_style="none"),
+        )
+        self.samples += rows.num_rows
+
+    def _add_intervals(self, rows: pa.Table) -> None:
+        for segment, t in zip(rows["segment"].to_pylist(), rows["t_s"].to_pylist(), strict=True):
+            if len(self._intervals) == MOST_INTERVALS:
+                return
+            if self._previous is not None and self._previous[0] == segment:
+                self._intervals.append(t - self._previous[1])
+            self._previous = segment, t
 
     def close(self, source: str) -> None:
         """Finish the file and write what describes it."""
@@ -128,13 +138,17 @@ class BidsSession:
         self._events: list[Row] = []
         folder.mkdir(parents=True, exist_ok=True)
 
+    def add_gaze(self, rows: pa.Table) -> None:
+        """Add rows of the table ``gaze``; gaze on AOIs has no coordinates and is not part of BIDS."""
+        points = rows.filter(pc.is_valid(rows["valid"]))
+        for source in pc.unique(points["source"]).to_pylist():
+            if source not in self._gaze:
+                self._gaze[source] = GazeFile(self._recording(len(self._gaze) + 1), self._screen)
+            self._gaze[source].add(points.filter(pc.equal(points["source"], source)))
+
     def add(self, table: str, row: Row) -> None:
-        """Add a row of one of the tables; rows of other tables are not part of BIDS."""
-        if table == "gaze" and row.get("valid") is not None:  # gaze on AOIs has no coordinates
-            if row["source"] not in self._gaze:
-                self._gaze[row["source"]] = GazeFile(self._recording(len(self._gaze) + 1), self._screen)
-            self._gaze[row["source"]].add(row)
-        elif table == "fixations":
+        """Add a row of one of the other tables; rows of tables that BIDS does not have are left out."""
+        if table == "fixations":
             self._fixations.setdefault(row["source"], []).append(row)
         elif table in ("decisions", "performances", "markers"):
             self._events.append(event_of(table, row))
@@ -160,7 +174,7 @@ class BidsSession:
             return
         with (
             open(stem.with_name(f"{stem.name}_physioevents.tsv.gz"), "wb") as raw,
-            gzip.GzipFile("", "wb", fileobj=raw, mtime=0) as file,
+            gzip.GzipFile("", "wb", GZIP_LEVEL, fileobj=raw, mtime=0) as file,
         ):
             for row in sorted(rows, key=lambda row: (row["segment"], row["start_s"])):
                 x, y = row["x"] * self._screen.width, row["y"] * self._screen.height
@@ -219,12 +233,6 @@ markers (events). Gaze positions are in pixels of the screen that was given to t
 time since the session's start; the time of gaze is that of its source, and session_time connects the two.
 participants.tsv and the sessions.tsv files name the ids that the labels stand for.
 """
-
-
-def _pixels(row: Row, screen: Screen) -> tuple[float | None, float | None]:
-    if row["x"] is None or row["y"] is None:
-        return None, None
-    return row["x"] * screen.width, row["y"] * screen.height
 
 
 def _described(columns: Mapping[str, tuple[str, str]]) -> dict[str, dict[str, str]]:

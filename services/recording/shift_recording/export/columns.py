@@ -119,8 +119,13 @@ def _bare(annotation: Any) -> Any:
 def values_of(message: BaseModel, prefix: str = "") -> dict[str, Any]:
     """Return a message's values by column; texts of a list are joined with ``" | "``."""
     found: dict[str, Any] = {}
+    values = message.__dict__
     for name, column in _fields(type(message), prefix):
-        _put(found, column, getattr(message, name))
+        value = values[name]
+        if value is None or type(value) in PLAIN:
+            found[column] = value
+        else:
+            _put(found, column, value)
     return found
 
 
@@ -132,15 +137,16 @@ def _fields(kind: type[BaseModel], prefix: str) -> tuple[tuple[str, str], ...]:
 
 
 def _put(found: dict[str, Any], name: str, value: Any) -> None:
-    if value is None or type(value) in PLAIN:
-        found[name] = value
-    elif isinstance(value, Stamp):
+    if isinstance(value, Stamp):
         found[f"{name}_utc"] = value.ns
     elif isinstance(value, BaseModel) and not isinstance(value, Seen):
         found.update(values_of(value, f"{name}_"))
     elif isinstance(value, Mapping):
         for key, each in value.items():
-            _put(found, f"{name}_{key}", each)
+            if each is None or type(each) in PLAIN:
+                found[f"{name}_{key}"] = each
+            else:
+                _put(found, f"{name}_{key}", each)
     elif isinstance(value, list) and value and isinstance(value[0], float):
         found.update((f"{SINGULAR.get(name, name)}_{n}", each) for n, each in enumerate(value, 1))
     elif isinstance(value, list):

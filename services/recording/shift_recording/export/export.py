@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from shift_schemas.errors import InvalidSettings
-from shift_schemas.messages import Session
 
 from shift_recording.durable_file import make_folder, write_durably
-from shift_recording.export.bids import BidsSession, Labels, Screen, write_data_set
 from shift_recording.export.columns import Column
 from shift_recording.export.dictionary import dictionary_csv
-from shift_recording.export.sources import OneRecording, OnProgress, Report, Sources, covariates_of, open_sources
-from shift_recording.export.tables import Row, table_columns
+from shift_recording.export.screen import Screen
+from shift_recording.export.sources import OneRecording, OnProgress, Report, Sources, open_sources
+from shift_recording.export.tables import table_columns
 from shift_recording.export.vowpal_wabbit import line_of
 from shift_recording.parallel import for_each
+
+if TYPE_CHECKING:
+    from shift_recording.export.arrow_tables import TableFiles
 
 Format = Literal["csv", "parquet", "bids", "vw"]
 DICTIONARY = "data-dictionary.csv"
@@ -93,7 +94,7 @@ def export(
     make_folder(out)
     if to == "bids":
         assert screen is not None
-        return _bids(sources, out, screen, way.on_progress)
+        return _bids(sources, out, screen, way)
     if to == "vw":
         return _vowpal_wabbit(sources, out, way.on_progress)
     return _tables(sources, to, out, way)
@@ -101,25 +102,36 @@ def export(
 
 def _tables(sources: Sources, to: str, out: Path, way: Way) -> Exported:
     try:
-        from shift_recording.export.arrow_tables import TableFiles, stored
+        from shift_recording.export.arrow_tables import TableFiles, batches
     except ImportError as e:
         raise InvalidSettings(EXTRA) from e
     tables = table_columns(sources.names, sources.covariate_names)
-    with TemporaryDirectory(dir=out, prefix=".parts-") as folder, TableFiles(out, to, tables) as files:
+    with TableFiles(out, to, tables) as files:
+        if way.scheduler or (way.workers != 1 and len(sources.files) > 1):
+            _read_elsewhere(sources, files, way)
+        else:
+            for recording in sources.recordings(way.on_progress):
+                files.write(batches(recording, tables, files.as_text))
+    write_durably(out / DICTIONARY, dictionary_csv(tables).encode())
+    paths = (*(files.path(table) for table in tables), out / DICTIONARY)
+    return Exported(paths, files.counts, sources.report)
+
+
+def _read_elsewhere(sources: Sources, files: TableFiles, way: Way) -> None:
+    """Let other processes read the recordings; each leaves its rows in a temporary file."""
+    from shift_recording.export.arrow_tables import stored
+
+    with TemporaryDirectory(dir=files.out, prefix=".parts-") as folder:
         tasks = [
-            _Task(path, Path(folder) / f"{i}.part", sources.covariates, tables, to == "csv")
+            _Task(path, Path(folder) / f"{i}.part", sources.covariates, files.tables, files.as_text)
             for i, path in enumerate(sources.files)
         ]
         for i, report in enumerate(for_each(_store_rows, tasks, way.workers, way.scheduler)):
             sources.report.damaged |= report.damaged
-            for batch in stored(tasks[i].part):
-                files.add(batch)
+            files.write(stored(tasks[i].part))
             tasks[i].part.unlink()
             if way.on_progress is not None:
                 way.on_progress(i + 1, len(tasks))
-    write_durably(out / DICTIONARY, dictionary_csv(tables).encode())
-    paths = (*(files.path(table) for table in tables), out / DICTIONARY)
-    return Exported(paths, files.counts, sources.report)
 
 
 @dataclass(frozen=True)
@@ -138,17 +150,18 @@ def _store_rows(task: _Task) -> Report:
     from shift_recording.export.arrow_tables import batches, store
 
     report = Report()
-    rows = OneRecording(task.path, report, task.covariates, gaze_by_chunk=True)
+    rows = OneRecording(task.path, report, task.covariates)
     store(batches(rows, task.tables, task.as_text), task.part)
     return report
 
 
 def _vowpal_wabbit(sources: Sources, out: Path, on_progress: OnProgress | None) -> Exported:
-    lines, decisions = [], 0
-    for table, row in sources.rows(on_progress):
-        if table == "decisions":
-            decisions += 1
-            lines.append(line_of(row))
+    lines: list[str | None] = []
+    decisions = 0
+    for recording in sources.recordings(on_progress):
+        rows = [row for table, row in recording.rows_of(None) if table == "decisions"]
+        decisions += len(rows)
+        lines += map(line_of, rows)
     path = out / "decisions.vw"
     kept = [line for line in lines if line is not None]
     write_durably(path, "".join(f"{line}\n" for line in kept).encode())
@@ -156,39 +169,10 @@ def _vowpal_wabbit(sources: Sources, out: Path, on_progress: OnProgress | None) 
                     sources.report)  # fmt: skip
 
 
-class _DataSet:
-    """The sessions of a BIDS data set, and what its labels stand for."""
-
-    def __init__(self, out: Path, screen: Screen, covariates: Mapping[str, Mapping[str, str]]) -> None:
-        self._out, self._screen, self._covariates = out, screen, covariates
-        self._labels = {kind: Labels() for kind in ("participant", "session", "study")}
-        self.people: dict[str, Row] = {}
-        self.sessions: dict[str, list[Row]] = {}
-
-    def session(self, session: Session, file: str) -> BidsSession:
-        """Return the folder of a session, and note whose it is."""
-        subject = self._labels["participant"].of(session.participant)
-        name, study = self._labels["session"].of(session.session), self._labels["study"].of(session.study)
-        given = covariates_of(session, self._covariates)
-        self.people[subject] = {"participant_id": f"sub-{subject}", "pseudonym": session.participant, **given}
-        named = {"session_id": f"ses-{name}", "session": session.session, "file": file}
-        self.sessions.setdefault(subject, []).append(named)
-        folder = self._out / f"sub-{subject}" / f"ses-{name}" / "beh"
-        return BidsSession(folder, f"sub-{subject}_ses-{name}_task-{study}", self._screen)
-
-
-def _bids(sources: Sources, out: Path, screen: Screen, on_progress: OnProgress | None) -> Exported:
-    data_set = _DataSet(out, screen, sources.covariates)
-    counts = dict.fromkeys(("sessions", "gaze", "fixations", "decisions", "performances", "markers"), 0)
-    for recording in sources.recordings(on_progress):
-        folder: BidsSession | None = None
-        for table, row in recording:
-            if folder is None and recording.rows.session is not None:
-                folder = data_set.session(recording.rows.session, recording.rows.file)
-            if folder is not None:
-                folder.add(table, row)
-                counts |= {table: counts[table] + 1} if table in counts and table != "gaze" else {}
-        if folder is not None:
-            counts["gaze"] += folder.close(recording.rows.study)
-    write_data_set(out, data_set.people.values(), data_set.sessions, version("shift-mesh"))
-    return Exported(tuple(sorted(path for path in out.rglob("*") if path.is_file())), counts, sources.report)
+def _bids(sources: Sources, out: Path, screen: Screen, way: Way) -> Exported:
+    try:
+        from shift_recording.export.data_set import export_data_set
+    except ImportError as e:
+        raise InvalidSettings(EXTRA) from e
+    files, counts = export_data_set(sources, out, screen, way.on_progress)
+    return Exported(files, counts, sources.report)

@@ -10,7 +10,7 @@ from shift_schemas.errors import InvalidSettings
 
 from shift_recording.export.export import EXTRA
 from shift_recording.export.sources import open_sources
-from shift_recording.export.tables import Row, table_columns
+from shift_recording.export.tables import table_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,14 +58,16 @@ def frames(*recordings: str | Path, covariates: str | Path | None = None) -> Fra
     """
     try:
         import pandas  # noqa: F401
+        import pyarrow as pa
 
-        from shift_recording.export.arrow_tables import batch_of
+        from shift_recording.export.arrow_tables import batches, schema_of
     except ImportError as e:
         raise InvalidSettings(EXTRA) from e
     sources = open_sources(map(Path, recordings), Path(covariates) if covariates is not None else None, True)
     tables = table_columns(sources.names, sources.covariate_names)
-    rows: dict[str, list[Row]] = {table: [] for table in tables}
-    for table, row in sources.rows():
-        rows[table].append(row)
+    found: dict[str, list[pa.Table]] = {name: [schema_of(c, False).empty_table()] for name, c in tables.items()}
+    for recording in sources.recordings():
+        for batch in batches(recording, tables, False):
+            found[batch.table].append(batch.rows)
     sources.report.raise_damage()
-    return Frames({table: batch_of(rows[table], columns, False).to_pandas() for table, columns in tables.items()})
+    return Frames({table: pa.concat_tables(rows).to_pandas() for table, rows in found.items()})

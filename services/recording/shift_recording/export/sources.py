@@ -6,16 +6,22 @@ import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing
-from shift_schemas.messages import Session
+from shift_schemas.messages import Gaze, Session
 
 from shift_recording.exclusion import read_exclusion
 from shift_recording.export.columns import Names
 from shift_recording.export.tables import RecordingRows, Row, names_in
 from shift_recording.files import recordings_in
-from shift_recording.mcap.reader import Recording
+from shift_recording.mcap.index import facts_about
+from shift_recording.mcap.reader import RecordedMessage, Recording, recorded_fact
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from shift_recording.export.gaze_samples import GazeReader
 
 OnProgress = Callable[[int, int], None]
 """Called with the number of bytes that were read, and their total."""
@@ -37,31 +43,52 @@ class Report:
             raise DamagedRecording(f"{name}: {why}")
 
 
-class OneRecording:
-    """The rows of one recording. Iterate over it once."""
+HELD_BYTES = 2**20
+"""Gaze is read when so many bytes of it are held: about 20,000 samples."""
 
-    def __init__(
-        self,
-        path: Path,
-        report: Report,
-        covariates: Mapping[str, Mapping[str, str]],
-        gaze_by_chunk: bool = False,
-    ) -> None:
-        self.rows = RecordingRows(path.name, gaze_by_chunk)
+
+class OneRecording:
+    """The rows of one recording. Read it once."""
+
+    def __init__(self, path: Path, report: Report, covariates: Mapping[str, Mapping[str, str]]) -> None:
+        self.rows = RecordingRows(path.name)
         self._path, self._report, self._covariates = path, report, covariates
 
-    def __iter__(self) -> Iterator[tuple[str, Row]]:
-        """Yield the rows, each with its table. A damaged file is reported and gives the rows before the damage."""
+    def rows_of(self, gaze: GazeReader | None) -> Iterator[tuple[str, Row | pa.Table]]:
+        """Yield the rows, each with its table; gaze comes as tables of pyarrow, and not at all without a reader.
+
+        A damaged file is reported and gives the rows before the damage.
+        """
         name, recording = self._path.name, Recording(self._path)
+        held: list[RecordedMessage] = []
+        size = 0
         try:
             self.rows.session = first_session(self._path)
-            for recorded in recording.facts():
-                yield from self.rows.rows(recorded)
+            for message in recording.messages():
+                if message.topic != Gaze.subject:
+                    yield from self.rows.rows(recorded_fact(self._path, message))
+                elif gaze is not None:
+                    held.append(message)
+                    size += len(message.data)
+                    if size >= HELD_BYTES:
+                        reading, held, size = held, [], 0
+                        yield from self._samples(gaze, reading)
         except (DamagedRecording, MalformedMessage) as e:
+            self._report.damaged[name] = e.detail
+        try:
+            if gaze is not None and held:
+                yield from self._samples(gaze, held)
+        except DamagedRecording as e:
             self._report.damaged[name] = e.detail
         whole = recording.report.complete and name not in self._report.damaged
         reason = "" if whole else self._report.damaged.get(name, recording.report.reason)
         yield from self.rows.rest(whole, reason, covariates_of(self.rows.session, self._covariates))
+
+    def _samples(self, gaze: GazeReader, messages: list[RecordedMessage]) -> Iterator[tuple[str, pa.Table]]:
+        samples = gaze.read(self.rows.session, messages)
+        yield "gaze", samples.rows
+        if samples.damage is not None:
+            raise DamagedRecording(f"{self._path.name}: {samples.damage.detail}")
 
 
 @dataclass(frozen=True)
@@ -88,11 +115,6 @@ class Sources:
             done += path.stat().st_size
             if on_progress is not None:
                 on_progress(done, total)
-
-    def rows(self, on_progress: OnProgress | None = None) -> Iterator[tuple[str, Row]]:
-        """Yield the rows of all recordings, each with its table."""
-        for recording in self.recordings(on_progress):
-            yield from recording
 
 
 def first_session(path: Path) -> Session | None:
@@ -166,7 +188,7 @@ def open_sources(paths: Iterable[Path], covariates: Path | None, with_excluded: 
             excluded = read_exclusion(path).in_force
             if excluded is None or with_excluded:
                 _check_session(path, session_files, names)
-                names_in((recorded.fact for recorded in Recording(path).facts(("config", "decision"))), names)
+                names_in((recorded.fact for recorded in facts_about(path, ("config", "decision"))), names)
         except DamagedRecording as e:
             report.damaged[path.name] = e.detail
         if excluded is not None and not with_excluded:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 from shift_schemas.messages import (
     Clock,
@@ -80,16 +80,6 @@ RESULT = ("comprehension_success", "comprehension_duration_s", "comprehension_va
 Row = dict[str, Any]
 
 
-class GazeChunkRow(NamedTuple):
-    """A chunk of gaze whose samples become rows."""
-
-    fact: Gaze
-    same: Row
-    """The values that all of its rows have."""
-    session_s: float | None
-    """When the chunk was applied, s since the session's start."""
-
-
 GAZE_VIEW = {column.name for column in columns_of(GazeView, Names(), "observation", "gaze_")} | {"gaze_category"}
 """The columns of what an observation says of gaze, without the weights."""
 
@@ -146,15 +136,13 @@ class RecordingRows:
     """
 
     file: str
-    gaze_by_chunk: bool = False
-    """Whether gaze is yielded as the columns of a chunk, which is faster, instead of one row for each sample."""
     session: Session | None = None
     study: Study | None = None
     """The study of the first configuration."""
     _last: Session | None = None
     _decisions: list[Decision] = field(default_factory=list)
     _performances: dict[str, Row] = field(default_factory=dict)
-    _partner: dict[int, Row] = field(default_factory=dict)
+    _observed: dict[int, Row] = field(default_factory=dict)
 
     def keys(self) -> Row:
         """Return the columns with which every row begins."""
@@ -164,7 +152,7 @@ class RecordingRows:
         return {"session": session.session, "participant": session.participant, "condition": session.condition}
 
     def rows(self, recorded: RecordedFact) -> Iterator[tuple[str, Row]]:
-        """Yield the rows of a fact, each with its table."""
+        """Yield the rows of a fact, each with its table. Gaze is read by ``gaze_samples``, many chunks at once."""
         fact = recorded.fact
         if isinstance(fact, Session):
             self.session = self.session or fact
@@ -172,12 +160,6 @@ class RecordingRows:
             return
         if isinstance(fact, Config):
             self.study = self.study or study_from_json(fact.study)
-            return
-        if isinstance(fact, Gaze):
-            if self.gaze_by_chunk:
-                yield "gaze", self._gaze_chunk(fact)
-            else:
-                yield from (("gaze", row) for row in self._gaze_rows(fact))
             return
         table = TABLE_OF.get(fact.subject)
         if table is None:
@@ -187,7 +169,7 @@ class RecordingRows:
             return
         values = values_of(fact)
         if isinstance(fact, Observation):
-            self._partner[fact.version] = {name: value for name, value in values.items() if _is_partner(name)}
+            self._observed[fact.version] = values
         if isinstance(fact, Performance):
             self._performances[fact.decision_id] = {name: values[name] for name in RESULT}
         yield table, {**self.keys(), "session_s": self._session_s(fact.stamp.ns), **values}
@@ -195,7 +177,8 @@ class RecordingRows:
     def rest(self, complete: bool, reason: str, covariates: Mapping[str, str]) -> Iterator[tuple[str, Row]]:
         """Yield the rows of the decisions, and the one of the session."""
         for fact in sorted(self._decisions, key=lambda d: d.n):
-            partner = self._partner.get(fact.versions.observation, {})
+            observed = self._observed.get(fact.versions.observation, {})
+            partner = {name: value for name, value in observed.items() if _is_partner(name)}
             result = self._performances.get(fact.decision_id, {})
             time = {"session_s": self._session_s(fact.stamp.ns), "action": 1 + fact.actions.index(fact.strategy)}
             yield "decisions", {**self.keys(), **time, **values_of(fact), **partner, **result}
@@ -210,25 +193,3 @@ class RecordingRows:
 
     def _session_s(self, ns: int) -> float | None:
         return (ns - self.session.started.ns) / NS if self.session is not None else None
-
-    def _gaze_rows(self, fact: Gaze) -> Iterator[Row]:
-        same, end_s = self.gaze_keys(fact), self._session_s(fact.stamp.ns)
-        for i, t in enumerate(fact.t):
-            row = {**same, "sample": i, "t_s": t, "session_s": None if end_s is None else end_s - (fact.t[-1] - t)}
-            if fact.aoi:
-                row["aoi"] = fact.aoi[i]
-            else:
-                valid = fact.valid[i]
-                row |= {"x": fact.x[i] if valid else None, "y": fact.y[i] if valid else None, "valid": valid}
-            yield row
-
-    def gaze_keys(self, fact: Gaze) -> Row:
-        """Return the values that all samples of a chunk of gaze have."""
-        return {
-            **self.keys(), "source": fact.source, "segment": fact.segment, "seq": fact.seq, "outcome": fact.outcome,
-            "stamp_utc": fact.stamp.ns,
-        }  # fmt: skip
-
-    def _gaze_chunk(self, fact: Gaze) -> Row:
-        """Return a chunk of gaze as it is: its samples become rows later, many chunks at once."""
-        return {"chunk": GazeChunkRow(fact, self.gaze_keys(fact), self._session_s(fact.stamp.ns))}

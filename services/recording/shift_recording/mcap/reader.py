@@ -178,7 +178,7 @@ class Recording:
                 attachment = p.attachment_of(body)
                 self.attachments[attachment.name] = attachment
             case p.MESSAGE_INDEX:
-                p.check_message_index(body)
+                p.message_index_of(body)  # its content is not used
 
     def _add_channel(self, channel: p.ChannelRecord, length: int) -> None:
         self._hold(0 if channel.id in self._channels else length)

@@ -19,6 +19,7 @@ from shift_schemas.errors import DamagedRecording, shorten
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")  # opcode, length
+_INDEXED = struct.Struct("<QQ")
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX = 1, 2, 3, 4, 5, 6, 7
@@ -200,12 +201,15 @@ def attachment_of(body: memoryview) -> Attachment:
     return Attachment(name, media_type, data, log_time)
 
 
-def check_message_index(body: memoryview) -> None:
-    """Raise :class:`DamagedRecording` unless the record is a message index; its content is not used."""
+def message_index_of(body: memoryview) -> list[int]:
+    """Return the positions of a channel's messages in their unpacked chunk."""
     c = Cursor(body, "message index")
     c.number(2)
-    c.take(c.number(4))
+    pairs = c.take(c.number(4))
     c.end()
+    if len(pairs) % _INDEXED.size:
+        raise DamagedRecording(f"a message index has {len(pairs)} bytes, which is no number of entries")
+    return [position for _time, position in _INDEXED.iter_unpack(pairs)]
 
 
 def chunk_content(body: memoryview) -> bytes:
