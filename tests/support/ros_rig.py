@@ -14,12 +14,56 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+from xmlrpc.client import ServerProxy
 
 from support.free_ports import free_port
 from support.ros_environments import PACKAGES, ROOT, python_of, work_folder
 
 READY_WITHIN_S = 40.0
+DEBIAN_PYTHON = "/usr/bin/python3"
+"""The interpreter that sees Debian's rospy."""
+STAND_INS = ("rise_stand_in",)
 HERE = Path(__file__).parent / "ros_peers"
+
+
+class Roscore:
+    """A real roscore, on loopback: ``apt install python3-roslaunch python3-rosmaster python3-rospy rosout``."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.port = folder, free_port()
+        self.process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def env(self) -> dict[str, str]:
+        home = str(self.folder / "ros")
+        return {
+            "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}", "ROS_IP": "127.0.0.1", "ROS_HOME": home,
+            "ROS_LOG_DIR": f"{home}/log",
+        }  # fmt: skip
+
+    def start(self) -> None:
+        with open(self.folder / "roscore.log", "ab") as output:
+            self.process = subprocess.Popen(
+                ["/usr/bin/roscore", "-p", str(self.port)], env=os.environ | self.env, stdout=output, stderr=output
+            )
+        until = time.monotonic() + READY_WITHIN_S
+        while not self._answers():
+            assert self.process.poll() is None, (self.folder / "roscore.log").read_text()
+            assert time.monotonic() < until, "roscore does not answer"
+            time.sleep(0.05)
+
+    def stop(self) -> None:
+        if self.process is not None:
+            self.process.send_signal(signal.SIGINT)
+            self.process.wait(30)
+            self.process = None
+
+    def _answers(self) -> bool:
+        try:
+            master: Any = ServerProxy(self.env["ROS_MASTER_URI"])
+            return bool(master.lookupNode("/tests", "/rosout")[0] == 1)
+        except OSError:
+            return False
 
 
 class Bridge:
@@ -30,7 +74,8 @@ class Bridge:
         self.session = str(parameters.setdefault("session", "s1"))
         parameters.setdefault("create_session", "true")
         self.router = f"tcp/127.0.0.1:{free_port()}"
-        self.domain = 0 if backend == "native" else random.SystemRandom().randint(1, 101)
+        self.master = Roscore(folder)
+        self.domain = random.SystemRandom().randint(1, 101) if backend == "rclpy" else 0
         self.line = [
             *("--backend", backend, "--zenoh", zenoh, "--ros-router", self.router, "--ros-args"),
             *(word for name, value in parameters.items() for word in ("-p", f"{name}:={value}")),
@@ -46,17 +91,19 @@ class Bridge:
         packages = os.pathsep.join(str(ROOT / p) for p in PACKAGES)
         return env | {
             "ROS_DOMAIN_ID": str(self.domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", "PYTHONPATH": packages,
+            "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", "PYTHONPATH": packages, **self.master.env,
         }  # fmt: skip
 
     @property
     def python(self) -> str:
-        return sys.executable if self.backend == "native" else python_of("rclpy")
+        return python_of("rclpy") if self.backend == "rclpy" else sys.executable
 
     def __enter__(self) -> Bridge:
         if self.backend == "native":
             env = self.env | {"SHIFT_ROUTER_LISTEN": self.router}
             self._router = subprocess.Popen([sys.executable, "-m", "shift_runtime.router"], env=env)
+        if self.backend == "rospy":
+            self.master.start()
         self.start()
         return self
 
@@ -67,6 +114,7 @@ class Bridge:
         if self._router is not None:
             self._router.terminate()
             self._router.wait(20)
+        self.master.stop()
         if kind is not None:
             print(self.log.read_text()[-6000:])
 
@@ -102,12 +150,13 @@ class Bridge:
 class Peer:
     """A peer process, driven by lines."""
 
-    def __init__(self, name: str, bridge: Bridge) -> None:
+    def __init__(self, name: str, bridge: Bridge, *words: str) -> None:
         self.name = name
         self.bridge = bridge
-        arguments = [] if name == "rclpy" else [bridge.router]
+        program = name if name in STAND_INS else f"peer_{name}"
+        arguments = words or ([] if bridge.backend != "native" else [bridge.router])
         self.process = subprocess.Popen(
-            [python_of(name), str(HERE / f"peer_{name}.py"), *arguments],
+            [DEBIAN_PYTHON if bridge.backend == "rospy" else python_of(name), str(HERE / f"{program}.py"), *arguments],
             env=bridge.env | {"PYTHONPATH": str(HERE)}, cwd=work_folder(),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1,
         )  # fmt: skip
@@ -158,9 +207,9 @@ class Peer:
 
 
 @contextmanager
-def peer(name: str, bridge: Bridge) -> Iterator[Peer]:
-    """Run a peer until the context is left."""
-    found = Peer(name, bridge)
+def peer(name: str, bridge: Bridge, *words: str) -> Iterator[Peer]:
+    """Run a peer, with words on its command line, until the context is left."""
+    found = Peer(name, bridge, *words)
     try:
         yield found
     finally:

@@ -22,6 +22,7 @@ from shift_cli import (
     recover_commands,
     replay_command,
     robust_command,
+    ros1_command,
     ros2_command,
     simulate_command,
     study_command,
@@ -123,6 +124,7 @@ app.command("export")(export_command.export)
 app.command("recover")(recover_commands.recover)
 app.command("convert")(recover_commands.convert)
 app.command("replay")(replay_command.replay)
+app.command("ros1", context_settings=ros2_command.CONTEXT)(ros1_command.ros1)
 app.command("ros2", context_settings=ros2_command.CONTEXT)(ros2_command.ros2)
 app.add_typer(gaze_command.app, name="gaze")
 app.add_typer(study_command.app, name="study")

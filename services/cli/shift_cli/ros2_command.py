@@ -37,7 +37,12 @@ def ros2(
     shift-mesh ros2 --backend rclpy --ros-args -r __ns:=/lab -r shift/gaze:=/tracker/gaze
     """
     flags = {"backend": backend, "session": session, "zenoh": zenoh, "ros_router": ros_router}
-    given = []
+    run_bridge(context, flags)
+
+
+def run_bridge(context: typer.Context, flags: dict[str, str | None], *words: str) -> None:
+    """Replace this process by the bridge, with the flags that stand on the command line."""
+    given = list(words)
     for name, value in flags.items():  # the environment is read there, below what --ros-args says
         source = context.get_parameter_source(name)
         if value is not None and source is not None and source.name == "COMMANDLINE":

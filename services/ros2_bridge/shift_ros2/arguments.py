@@ -1,7 +1,7 @@
 """``--ros-args``: remaps, parameters and parameter files as ROS nodes take them. Pure; it only reads the files.
 
 ``--ros-args -r old:=new -p name:=value -r __ns:=/lab -r __node:=shift --params-file FILE --log-level LEVEL``,
-ended by ``--`` or the end of the line.
+ended by ``--`` or the end of the line. Words with ``:=`` outside of it are read as ROS 1 writes them.
 """
 
 from __future__ import annotations
@@ -50,6 +50,8 @@ def parse_ros_args(line: Sequence[str]) -> RosArguments:
         word = words.pop(0)
         if word == "--ros-args":
             inside = True
+        elif not inside and ":=" in word:
+            _ros1(found, word)
         elif not inside:
             found.rest.append(word)
         elif word == "--":
@@ -141,7 +143,7 @@ def _value(word: str, words: list[str]) -> str:
 def _pair(word: str, text: str) -> tuple[str, str]:
     left, sign, right = text.partition(":=")
     if not sign or not left or not right:
-        raise InvalidSettings(f"--ros-args: {word} {shorten(text)!r}: write {word} name:=value")
+        raise InvalidSettings(f"--ros-args: {word} {shorten(text)!r}: write {word} name:=value".replace("  ", " "))
     return left, right
 
 
@@ -156,6 +158,21 @@ def _remap(found: RosArguments, text: str) -> None:
         for scheme in _SCHEMES:
             left, right = left.removeprefix(scheme), right.removeprefix(scheme)
         found.remaps.append(Remap(left, right))
+
+
+def _ros1(found: RosArguments, word: str) -> None:
+    """Take a word as ROS 1 and its roslaunch write it: ``__name:=x``, ``_parameter:=value`` or ``old:=new``."""
+    left, right = _pair("", word)
+    if left in ("__name", "__ns"):
+        _remap(found, word)
+    elif left == "__master":
+        found.parameters["master"] = right
+    elif left.startswith("__"):
+        pass  # __log, __ip and __hostname: rospy reads them itself
+    elif left.startswith("_"):
+        found.parameters[left[1:]] = _scalar(left, right)
+    else:
+        _remap(found, word)
 
 
 def _scalar(name: str, value: Any) -> str:

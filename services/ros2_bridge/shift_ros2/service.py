@@ -60,7 +60,7 @@ async def serve(settings: BridgeSettings) -> None:
         log.info(
             "started", node=settings.node, namespace=settings.namespace, session=bridge.session,
             backend=settings.backend, mesh=settings.zenoh,
-            ros=settings.ros_router if settings.backend == "native" else f"domain {settings.domain}",
+            ros=_graph(settings),
         )  # fmt: skip
         running = asyncio.create_task(bridge.run())
         stopping = asyncio.create_task(stop.wait())
@@ -79,7 +79,11 @@ async def serve(settings: BridgeSettings) -> None:
 
 
 async def open_backend(settings: BridgeSettings, bridge: Bridge) -> Backend:
-    """Return the backend that the settings name. The other one is not imported."""
+    """Return the backend that the settings name. The others are not imported."""
+    if settings.backend == "rospy":
+        from shift_ros2.rospy_backend import RospyBackend
+
+        return await RospyBackend.open(settings, bridge)
     if settings.backend == "rclpy":
         from shift_ros2.rclpy_backend import RclpyBackend
 
@@ -87,6 +91,17 @@ async def open_backend(settings: BridgeSettings, bridge: Bridge) -> Backend:
     from shift_ros2.native_backend import NativeBackend
 
     return await NativeBackend.open(settings, bridge)
+
+
+def _graph(settings: BridgeSettings) -> str:
+    """Return where the bridge meets the ROS nodes."""
+    match settings.backend:
+        case "native":
+            return settings.ros_router
+        case "rclpy":
+            return f"domain {settings.domain}"
+        case "rospy":
+            return settings.master
 
 
 def _on_signal(stop: Callable[[], None]) -> None:

@@ -17,6 +17,7 @@ from shift_ros2.interfaces import INTERFACES
 from shift_ros2.names import Remap, check_namespace, check_node, resolved
 
 DEFAULT_ROS_ROUTER = "tcp/localhost:7447"
+DEFAULT_MASTER = "http://localhost:11311"
 DEFAULT_SESSION = "ros"
 Reliability = Literal["best_effort", "reliable"]
 
@@ -24,7 +25,10 @@ Reliability = Literal["best_effort", "reliable"]
 class BridgeSettings(ClientSettings):
     """The settings of the bridge. Each name is a ROS parameter, and ``SHIFT_NAME`` in the environment."""
 
-    backend: Literal["native", "rclpy"] = Field(default="native", description="How it speaks to ROS.")
+    backend: Literal["native", "rclpy", "rospy"] = Field(
+        default="native", description="How it speaks to ROS 2; rospy speaks to ROS 1."
+    )
+    master: str = Field(default=DEFAULT_MASTER, description="rospy: the ROS master; else ROS_MASTER_URI.")
     ros_router: str = Field(default=DEFAULT_ROS_ROUTER, description="native: the Zenoh router that ROS nodes meet at.")
     ros_listen: str = Field(
         default="tcp/localhost:0", description="native: where ROS nodes link directly; empty: all goes by the router."
@@ -51,6 +55,12 @@ class BridgeSettings(ClientSettings):
     gaze_wait_s: float = Field(default=0.03, ge=0, le=1, description="How long a sample waits for others, s.")
     diagnostics_s: float = Field(default=1.0, gt=0, le=3600, description="Diagnostics at most this often, s.")
     ros4hri: bool = Field(default=True, description="Take what hri_msgs topics say of persons as markers.")
+    rise_memory: bool = Field(default=False, description="rospy: assign each decision in RISE's memory.")
+    rise_event: bool = Field(default=False, description="rospy: raise RISE's event shift_decision for each decision.")
+    rise_action: str = Field(
+        default="", description="rospy: file with the definition of RISE's DomainTaskAction; empty: the built-in one."
+    )
+    rise_goal: str = Field(default="/rise/set/domainTask/goal", description="rospy: the topic of RISE's goals.")
     patience_s: float = Field(default=4.0, gt=0, le=300, description="How long a service may take to come back, s.")
     remaps: tuple[tuple[str, str], ...] = Field(default=(), description="Remap rules, (old, new).")
 
@@ -76,6 +86,7 @@ PARAMETERS: frozenset[str] = frozenset(BridgeSettings.model_fields) - {"remaps",
 """The parameters that ``-p`` and parameter files can set; node and namespace are set by remapping, as in ROS."""
 _FLAGS = {
     "--backend": "backend", "--session": "session", "--zenoh": "zenoh", "--ros-router": "ros_router", "--data": "data",
+    "--master": "master",
 }  # fmt: skip
 
 
@@ -106,7 +117,11 @@ def bridge_settings(line: Sequence[str]) -> BridgeSettings:
 
 def _ros_environment() -> Parameters:
     """Return the settings that every ROS node takes from the environment; settings of the bridge override them."""
-    variables = {"domain": ("SHIFT_DOMAIN", "ROS_DOMAIN_ID"), "distribution": ("SHIFT_DISTRIBUTION", "ROS_DISTRO")}
+    variables = {
+        "domain": ("SHIFT_DOMAIN", "ROS_DOMAIN_ID"),
+        "distribution": ("SHIFT_DISTRIBUTION", "ROS_DISTRO"),
+        "master": ("SHIFT_MASTER", "ROS_MASTER_URI"),
+    }
     return {
         name: os.environ[theirs]
         for name, (ours, theirs) in variables.items()
