@@ -73,6 +73,7 @@ def ended(mesh: LiveMesh, session: str) -> list[Any]:
 def test_kills_of_the_bridge_and_a_restarted_master_lose_nothing(mesh: LiveMesh, tmp_path: Path) -> None:
     """Every acknowledged decision and counted report is recorded once, and gaze goes on after each fault."""
     acknowledged: list[str] = []
+    parameters = {"study": "coffee", "task": "grasp"}
     with (
         Bridge(mesh.zenoh, tmp_path, "rospy", session="faults", **parameters) as bridge,
         peer("rospy", bridge) as robot,

@@ -134,3 +134,24 @@ def test_every_parameter_is_documented() -> None:
     text = (ROOT / "docs" / "ros2.md").read_text()
     inherited = {"listen", "data", "log_level", "log_json"}
     assert [p for p in sorted(PARAMETERS - inherited) if f"`{p}`" not in text] == []
+
+
+def test_words_of_ros_1_are_names_parameters_and_remaps() -> None:
+    line = "__name:=tutor __ns:=/lab _session:=010 _create_session:=true shift/gaze:=/g __log:=/l __ip:=1.2.3.4"
+    found = parse_ros_args([*line.split(), "__master:=http://robot:11311", "--zenoh", "tcp/a:1"])
+    assert (found.node, found.namespace) == ("tutor", "/lab")
+    assert found.parameters == {"session": "010", "create_session": "true", "master": "http://robot:11311"}
+    assert found.remaps == [Remap("shift/gaze", "/g")]
+    assert found.rest == ["--zenoh", "tcp/a:1"]
+
+
+@pytest.mark.parametrize("word", ["_session:=", ":=x"])
+def test_word_of_ros_1_without_a_part_is_refused(word: str) -> None:
+    with pytest.raises(InvalidSettings, match="write name:=value"):
+        parse_ros_args([word])
+
+
+def test_master_is_that_of_every_ros_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_MASTER_URI", "http://robot:11311")
+    assert bridge_settings(["--backend", "rospy"]).master == "http://robot:11311"
+    assert bridge_settings(["--backend", "rospy", "--master", "http://a:1"]).master == "http://a:1"

@@ -143,7 +143,7 @@ def _value(word: str, words: list[str]) -> str:
 def _pair(word: str, text: str) -> tuple[str, str]:
     left, sign, right = text.partition(":=")
     if not sign or not left or not right:
-        raise InvalidSettings(f"--ros-args: {word} {shorten(text)!r}: write {word} name:=value".replace("  ", " "))
+        raise InvalidSettings(f"--ros-args: {word} {shorten(text)!r}: write {word} name:=value")
     return left, right
 
 
@@ -162,7 +162,9 @@ def _remap(found: RosArguments, text: str) -> None:
 
 def _ros1(found: RosArguments, word: str) -> None:
     """Take a word as ROS 1 and its roslaunch write it: ``__name:=x``, ``_parameter:=value`` or ``old:=new``."""
-    left, right = _pair("", word)
+    left, _, right = word.partition(":=")
+    if not left or not right:
+        raise InvalidSettings(f"{shorten(word)!r}: write name:=value")
     if left in ("__name", "__ns"):
         _remap(found, word)
     elif left == "__master":
