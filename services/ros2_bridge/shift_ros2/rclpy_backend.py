@@ -20,6 +20,7 @@ from shift_schemas.errors import InvalidSettings
 from shift_ros2.backend import Answer, BackendBase, Handlers, answer_of, unavailable_answer
 from shift_ros2.interfaces import INTERFACES, Interface
 from shift_ros2.ros4hri import TRACKED
+from shift_ros2.say_skill import SaySkill, say_skill_of
 from shift_ros2.settings import BridgeSettings
 
 log = structlog.get_logger()
@@ -36,6 +37,7 @@ class RclpyBackend(BackendBase):
         self._ros = ros
         self._publishers: dict[str, Any] = {}
         self._engagements: set[str] = set()
+        self._say_skill: SaySkill | None = None
         self._closing = False
 
     @classmethod
@@ -47,8 +49,11 @@ class RclpyBackend(BackendBase):
 
     def publish(self, topic: str, text: str) -> None:
         """Publish a text on one of the interfaces."""
-        if not self._closing:
-            self._publishers[topic].publish(self._ros.String(data=text))
+        if self._closing:
+            return
+        self._publishers[topic].publish(self._ros.String(data=text))
+        if topic == "say" and self._say_skill is not None:
+            self._say_skill.say(text)
 
     @property
     def state(self) -> str:
@@ -78,6 +83,8 @@ class RclpyBackend(BackendBase):
             self._declare(interface, settings.names[interface.topic])
         if settings.ros4hri:
             self._declare_ros4hri()
+        if settings.say_skill:
+            self._say_skill = say_skill_of(self._node, settings.say_skill)
         self._executor = ros.Executor(context=self._context)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)

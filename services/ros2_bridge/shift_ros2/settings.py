@@ -55,6 +55,9 @@ class BridgeSettings(ClientSettings):
     gaze_wait_s: float = Field(default=0.03, ge=0, le=1, description="How long a sample waits for others, s.")
     diagnostics_s: float = Field(default=1.0, gt=0, le=3600, description="Diagnostics at most this often, s.")
     ros4hri: bool = Field(default=True, description="Take what hri_msgs topics say of persons as markers.")
+    say_skill: str = Field(
+        default="/skill/say", description="rclpy: ROS4HRI's Say skill, which speaks each sentence; empty: not used."
+    )
     rise_memory: bool = Field(default=False, description="rospy: assign each decision in RISE's memory.")
     rise_event: bool = Field(default=False, description="rospy: raise RISE's event shift_decision for each decision.")
     rise_action: str = Field(
