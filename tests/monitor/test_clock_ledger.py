@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from shift_monitor import core
 from shift_monitor.core import MonitorState
-from shift_monitor.gaze_input import ChunkWithHistory, RecordedChunk
+from shift_monitor.gaze_input import COLUMNS, ChunkWithHistory, RecordedChunk
 from shift_schemas.errors import MalformedMessage
 from shift_schemas.messages import Clock, GazeChunk
 from shift_schemas.timestamps import NS, Stamp
@@ -58,7 +58,7 @@ def test_chunks_are_counted_by_what_became_of_them() -> None:
 
 def test_repeated_and_refused_chunks_are_counted() -> None:
     state = fed((chunk(0, [0.0, 0.1]), 0.0))
-    same = RecordedChunk(0, 2, (), ([0.0, 0.1], {"x": [], "y": [], "valid": [], "aoi": ["left", "left"]}))
+    same = RecordedChunk(0, 2, (), ([0.0, 0.1], COLUMNS | {"aoi": ["left", "left"]}))
     for _ in range(3):
         state = core.step(state, ChunkWithHistory(chunk(0, [0.0, 0.1]), (same,)), at(1)).state
     wrong = GazeChunk(source="tx", seq=1, t=[0.2], aoi=["nowhere"])

@@ -11,6 +11,10 @@ from shift_schemas.ids import Id
 from shift_schemas.messages.base import Count, Fact, GazeOutcome, Message, Seconds, StreamItem, Warnings
 from shift_schemas.timestamps import Stamp
 
+EYE_COLUMNS = ("pupil_left", "pupil_right", "openness_left", "openness_right")
+"""What a source can send of each eye beside gaze. It is recorded and exported; the model does not use it."""
+EyeColumn = list[Annotated[float, Field(ge=0, le=1e6)] | None] | None
+
 
 class Gaze(Fact):
     """A chunk of gaze as it was applied. Columns of equal length; a lost sample is 0, 0, invalid."""
@@ -27,6 +31,10 @@ class Gaze(Fact):
     y: list[float] = Field(default=[], description="0..1 from the top; empty for gaze on AOIs.")
     valid: list[bool] = Field(default=[], description="Whether the sample is valid; empty for gaze on AOIs.")
     aoi: list[str] = Field(default=[], description="AOI names; '' is no AOI. Empty for points.")
+    pupil_left: list[float] | None = Field(default=None, description="Pupil size, source's unit; 0 where lost.")
+    pupil_right: list[float] | None = Field(default=None, description="Pupil size, source's unit; 0 where lost.")
+    openness_left: list[float] | None = Field(default=None, description="Eye openness, source's unit; -1 where lost.")
+    openness_right: list[float] | None = Field(default=None, description="Eye openness, source's unit; -1 where lost.")
     warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake or has no effect.")
 
 
@@ -134,6 +142,10 @@ class GazeChunk(StreamItem):
     y: list[float | None] | None = Field(default=None, description="0..1 from the top; null where lost.")
     valid: list[bool] | None = Field(default=None, description="Left out: valid wherever x and y are given.")
     aoi: list[str | None] | None = Field(default=None, description="AOI names; null is no AOI.")
+    pupil_left: EyeColumn = Field(default=None, description="Pupil size, in the source's unit; null where lost.")
+    pupil_right: EyeColumn = Field(default=None, description="Pupil size, in the source's unit; null where lost.")
+    openness_left: EyeColumn = Field(default=None, description="Eye openness, in the source's unit; null where lost.")
+    openness_right: EyeColumn = Field(default=None, description="Eye openness, in the source's unit; null where lost.")
 
     @model_validator(mode="after")
     def _columns(self) -> GazeChunk:
@@ -145,6 +157,7 @@ class GazeChunk(StreamItem):
             raise ValueError("give either aoi, or x and y with valid")
         else:
             columns = [("x", self.x), ("y", self.y), ("valid", self.valid)]
+        columns += [(name, getattr(self, name)) for name in EYE_COLUMNS]
         for name, column in columns:
             if column is not None and len(column) != len(self.t):
                 raise ValueError(f"{name} has {len(column)} entries and t has {len(self.t)}; they must be as many")

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 from shift_schemas.errors import FieldError, MalformedMessage, shorten
 from shift_schemas.messages import GazeChunk
+from shift_schemas.messages.monitor import EYE_COLUMNS
 
-COLUMNS = ("t", "x", "y", "valid", "aoi")
+COLUMNS = ("t", "x", "y", "valid", "aoi", *EYE_COLUMNS)
 """The fields of a chunk that hold one value for each sample."""
 MOST_SOURCES = 256
 """How many sources are remembered. The monitor still compares the times of an older source; this module does not."""
