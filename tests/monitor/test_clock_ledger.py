@@ -122,3 +122,86 @@ def test_session_before_format_5_keeps_no_ledger() -> None:
 def test_state_is_restored_exactly() -> None:
     state = fed((chunk(0, [0.0, 0.1]), 0.0), (chunk(4, [0.7]), 0.9))
     assert core.load(core.dump(state)) == state
+
+
+# --- segments, jumps and ledgers of a running session (format 6) ---
+
+
+def steady(first: float, count: int, arrive: float, seq: int = 0, delay: float = 0.02) -> list[tuple[GazeChunk, float]]:
+    """Return chunks of two samples, ten a second, that arrive a little after their last sample."""
+    return [
+        (chunk(seq + n, [first + n / 10, first + n / 10 + 0.05]), arrive + n / 10 + 0.05 + delay) for n in range(count)
+    ]
+
+
+@pytest.mark.parametrize("step_s", [10.0, -10.0, 2.0, -0.5])
+def test_step_of_the_clock_is_a_segment_with_its_size(step_s: float) -> None:
+    state = fed(*steady(100.0, 50, 0.0), *steady(105.0 + step_s, 50, 5.0, seq=50))
+    (found,) = clocks(state).values()
+    assert (found.restarts, found.samples, found.missing, found.chunks) == (1, 200, 0, 100)
+    assert found.segments is not None
+    first, second = found.segments
+    assert (first.segment, first.samples, first.start_s, first.step_s) == (0, 100, 100.0, 0.0)
+    assert (second.segment, second.samples, second.start_s) == (1, 100, 105.0 + step_s)
+    assert second.step_s == pytest.approx(step_s, abs=1e-6)
+    assert state.restarts == 1
+
+
+def test_pause_of_the_source_is_not_a_jump() -> None:
+    state = fed(*steady(0.0, 50, 0.0), *steady(15.0, 50, 15.0, seq=50))
+    (found,) = clocks(state).values()
+    assert found.restarts == 0
+    assert found.longest_gap_s == pytest.approx(15.0 - 4.95)
+
+
+def test_pause_of_a_recording_that_plays_fast_is_not_a_jump() -> None:
+    play = [(each, seconds / 20) for each, seconds in (*steady(0.0, 500, 0.0), *steady(60.0, 50, 60.0, seq=500))]
+    (found,) = clocks(fed(*play)).values()
+    assert found.restarts == 0
+
+
+def test_gaze_that_waited_in_the_network_is_not_a_jump() -> None:
+    waited = [(each, max(seconds, 9.0)) for each, seconds in steady(5.0, 60, 5.0, seq=50)]
+    (found,) = clocks(fed(*steady(0.0, 50, 0.0), *waited)).values()
+    assert found.restarts == 0
+
+
+def test_session_before_format_6_does_not_look_for_jumps() -> None:
+    state = fed(*steady(0.0, 50, 0.0), *steady(15.0, 5, 5.0, seq=50), state=replace(configured_session(), format=5))
+    (found,) = clocks(state).values()
+    assert (found.restarts, found.segments) == (0, None)
+
+
+def test_restart_of_the_numbering_alone_has_no_step() -> None:
+    (found,) = clocks(fed(*steady(0.0, 20, 0.0), *steady(2.0, 20, 2.0))).values()
+    assert found.segments is not None
+    assert [(s.segment, s.samples) for s in found.segments] == [(0, 40), (1, 40)]
+    assert found.segments[1].step_s == pytest.approx(0, abs=1e-6)
+
+
+def test_ledger_lists_the_last_segments() -> None:
+    arrivals = [(chunk(n, [100.0 - n, 100.5 - n]), float(n)) for n in range(60)]
+    (found,) = clocks(fed(*arrivals)).values()
+    assert found.restarts == 59
+    assert found.segments is not None
+    assert [s.segment for s in found.segments] == list(range(27, 60))
+
+
+def test_ledger_is_recorded_every_ten_seconds_and_where_a_segment_begins() -> None:
+    state, recorded = configured_session(), []
+    for each, seconds in (*steady(0.0, 250, 0.0), *steady(0.0, 10, 25.0, seq=250)):
+        done = core.step(state, ChunkWithHistory(each), at(seconds))
+        state = done.state
+        recorded += [(seconds, fact) for fact in done.facts if isinstance(fact, Clock)]
+    assert [round(seconds) for seconds, _ in recorded] == [10, 20, 25]
+    assert [fact.restarts for _, fact in recorded] == [0, 0, 1]
+
+
+def test_what_the_source_measured_of_its_clock_is_kept() -> None:
+    measured = [(0.004, 7.5), (0.002, 7.6), (0.009, None)]
+    arrivals = [
+        (chunk(n, [n / 10]).model_copy(update={"round_trip_s": trip, "offset_s": offset}), n / 10)
+        for n, (trip, offset) in enumerate(measured)
+    ]
+    (found,) = clocks(fed(*arrivals)).values()
+    assert (found.round_trip_s, found.source_offset_s) == (0.002, 7.6)

@@ -23,6 +23,7 @@ from shift_monitor.gaze_account import LOST, OFF_STIMULUS, ON_STIMULUS, GazeAcco
 from shift_monitor.gaze_stream import GazeStream
 from shift_monitor.median import LONGEST_WINDOW, MedianWindow, Point
 from shift_monitor.prepared_study import PreparedStudy
+from shift_monitor.recent_samples import count_recent
 from shift_schemas.messages import GazeChunk
 from shift_schemas.timestamps import NS
 from shift_study.constants import AttentionSettings
@@ -46,7 +47,11 @@ def apply_points(
         attention, account = _apply_fixation_dwell(attention, account, output, prepared)
         found += output.found
     account = count_samples(account, times, kinds, prepared.rule.gap_ns)
-    return replace(stream, last_ns=times[-1], named=None, detector=detector, account=account), attention, found
+    recent = stream.recent
+    for i, t_ns in enumerate(times):
+        recent = count_recent(recent, [t_ns], [_point(chunk, i) is not None])
+    after = replace(stream, last_ns=times[-1], named=None, detector=detector, account=account, recent=recent)
+    return after, attention, found
 
 
 def _point(chunk: GazeChunk, i: int) -> tuple[float, float] | None:

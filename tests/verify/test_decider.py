@@ -63,6 +63,8 @@ CHANGES: dict[str, Sequence[tuple[Sequence[str | int], Callable[[Any], Any]]]] =
     "reason": [(["reason"], lambda v: "another")],
     "without_override": [(["without_override"], lambda v: {"negation": "negation", "hesitation": "none"})],
     "text": [(["text"], lambda v: "another")],
+    "gaze_age_s": [(["gaze_age_s"], lambda v: v + 1e-6)],
+    "gaze_valid": [(["gaze_valid"], lambda v: v - 1e-6)],
 }
 """Changes of the fields that a decision derives; what it answers (id, task, what was required) is tried below."""
 INPUTS = {"decision_id", "task", "required"}

@@ -83,6 +83,12 @@ class Decision(Fact):
     without_override: Strategy | None = Field(
         default=None, description="What SHIFT would have chosen without the override; left out without one."
     )
+    gaze_age_s: float | None = Field(
+        default=None, description="The age of the newest gaze that it rests on, s; left out without gaze."
+    )
+    gaze_valid: float | None = Field(
+        default=None, description="Share of valid samples in the last two seconds of that gaze, 0..1."
+    )
     text: str | None = Field(
         default=None, description="What the robot says; left out: the study has no sentence for it."
     )

@@ -35,11 +35,32 @@ class Gaze(Fact):
     pupil_right: list[float] | None = Field(default=None, description="Pupil size, source's unit; 0 where lost.")
     openness_left: list[float] | None = Field(default=None, description="Eye openness, source's unit; -1 where lost.")
     openness_right: list[float] | None = Field(default=None, description="Eye openness, source's unit; -1 where lost.")
+    round_trip_s: float | None = Field(default=None, description="As the source sent it, s.")
+    offset_s: float | None = Field(default=None, description="As the source sent it, s.")
     warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake or has no effect.")
 
 
+class ClockSegment(Message):
+    """What a source sent between two restarts or jumps of its clock."""
+
+    segment: Count = Field(description="Its number, from 0.")
+    samples: Count = Field(description="Samples that were applied.")
+    start_s: Seconds = Field(description="Its first sample, source clock, s.")
+    end_s: Seconds = Field(description="Its last sample, source clock, s.")
+    offset_s: float = Field(description="Mesh's clock minus source's clock, the smallest of the segment, s.")
+    step_s: float = Field(
+        default=0.0, description="How far the source's clock was set forward before it, s; 0 for the first one."
+    )
+    drift_ppm: float | None = Field(
+        default=None, description="How much faster the source's clock ran, millionths; left out below 10 s."
+    )
+
+
 class Clock(Fact):
-    """The ledger of a gaze source at the session's end: what came, what did not, and how its clock ran."""
+    """The ledger of a gaze source: what came, what did not, and how its clock ran.
+
+    It is recorded at the session's end; from format 6 on also where a segment begins, and every ten seconds.
+    """
 
     owner = "monitor"
     subject = "clock"
@@ -60,6 +81,15 @@ class Clock(Fact):
     drift_ppm: float | None = Field(
         default=None, description="How much faster the source's clock ran, millionths; left out below 10 s."
     )
+    round_trip_s: float | None = Field(
+        default=None, description="The smallest round trip to the tracker that the source measured, s."
+    )
+    source_offset_s: float | None = Field(
+        default=None, description="The offset of the two clocks that the source measured last, s."
+    )
+    segments: list[ClockSegment] | None = Field(
+        default=None, description="The last segments, oldest first; left out before format 6."
+    )
 
 
 class Fixation(Fact):
@@ -75,6 +105,9 @@ class Fixation(Fact):
     x: float = Field(description="Mean position, 0..1 from the left.")
     y: float = Field(description="Mean position, 0..1 from the top.")
     aoi: str = Field(description="The AOI at the mean position; '' is no AOI.")
+    aois: list[str] | None = Field(
+        default=None, description="Every AOI at the mean position, in the study's order; left out before format 6."
+    )
 
 
 class CapacityView(Message):
@@ -101,6 +134,9 @@ class GazeView(Message):
     off_aoi: float | None = Field(default=None, description="Share of its time on no AOI, 0..1.")
     off_stimulus: float | None = Field(
         default=None, description="Share of its time with points outside 0..1; part of unclassified or off_aoi."
+    )
+    valid: float | None = Field(
+        default=None, description="Share of valid samples in the last two seconds of the source's time, 0..1."
     )
     received: Stamp | None = Field(default=None, description="When the last applied sample was received.")
     age_s: float | None = Field(default=None, description="Time since then at the observation's stamp, s.")
@@ -146,6 +182,13 @@ class GazeChunk(StreamItem):
     pupil_right: EyeColumn = Field(default=None, description="Pupil size, in the source's unit; null where lost.")
     openness_left: EyeColumn = Field(default=None, description="Eye openness, in the source's unit; null where lost.")
     openness_right: EyeColumn = Field(default=None, description="Eye openness, in the source's unit; null where lost.")
+
+    round_trip_s: Annotated[float, Field(ge=0, le=3600)] | None = Field(
+        default=None, description="The round trip to the tracker that the source measured, s."
+    )
+    offset_s: Seconds | None = Field(
+        default=None, description="The sending computer's clock minus the source's clock, as the source measured it, s."
+    )
 
     @model_validator(mode="after")
     def _columns(self) -> GazeChunk:

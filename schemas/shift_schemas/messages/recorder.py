@@ -24,13 +24,16 @@ from shift_schemas.messages.base import (
 from shift_schemas.shared_text import shared
 from shift_schemas.timestamps import Stamp
 
-FORMAT = 5
+FORMAT = 6
 """The format that a new session records in. A session keeps the format that it began with.
 
 1: no shares of gaze, no warnings, no restarts. 2: an estimate is published only where it changes, and a decision does
 not record what it required. 3: a configuration always publishes its estimates, and a decision records ``required``.
 4: an observation follows a chunk of gaze only where its class or its warnings change, after 250 ms of the source's
-time, or where somebody needs it. 5: an overridden decision records what SHIFT would have chosen.
+time, or where somebody needs it. 5: an overridden decision records what SHIFT would have chosen, and the ledgers of
+the sources are recorded. 6: AOIs can move, a fixation lists every AOI that it fell on, a decision names the age and
+the validity of its gaze, a jump of a source's clock begins a segment, and a ledger lists its segments and is recorded
+while the session runs.
 """
 
 
@@ -69,7 +72,7 @@ class Session(Fact):
     software: str = Field(default="", description="Version of shift-mesh.")
     revision: str = Field(default="", description="Git revision of shift-mesh, where known.")
     shard: str = Field(default="", description="The shard of a mesh with several, such as 0/4; it never changes.")
-    format: Count = Field(default=1, description="Which facts and fields the session records; today 5.")
+    format: Count = Field(default=1, description="Which facts and fields the session records; today 6.")
     warnings: Warnings = Field(default=[], description="What was accepted at its start but may be a mistake.")
     covariates: dict[Id, CovariateText] = Field(default={}, description="What was given about the participant.")
 

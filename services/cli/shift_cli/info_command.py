@@ -77,11 +77,18 @@ def _clocks(found: RecordingInfo) -> Table:
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table("gaze source", "chunks", "late", "missing", "repeated", "refused", "restarts", "rate", "drift")
+    table = Table(
+        "gaze source", "chunks", "late", "missing", "repeated", "refused", "restarts", "rate", "longest gap", "drift",
+        "steps of the clock", "round trip",
+    )  # fmt: skip
     for clock in found.clocks:
         refused = ", ".join(f"{n} {kind}" for kind, n in clock["refused"].items()) or "0"
         rate = "-" if clock["rate_hz"] is None else f"{clock['rate_hz']:.4g} Hz"
         drift = "-" if clock["drift_ppm"] is None else f"{clock['drift_ppm']:+.0f} ppm"
         counts = [str(clock[name]) for name in ("chunks", "late", "missing", "repeated")]
-        table.add_row(escape(clock["source"]), *counts, refused, str(clock["restarts"]), rate, drift)
+        steps = ", ".join(f"{s['step_s']:+.3f} s" for s in (clock["segments"] or ())[1:]) or "-"
+        trip = "-" if clock["round_trip_s"] is None else f"{1000 * clock['round_trip_s']:.1f} ms"
+        gap = f"{clock['longest_gap_s']:.3g} s"
+        row = (*counts, refused, str(clock["restarts"]), rate, gap, drift, steps, trip)
+        table.add_row(escape(clock["source"]), *row)
     return table

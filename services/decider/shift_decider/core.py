@@ -25,6 +25,7 @@ from shift_schemas.messages import (
     Decision,
     Estimate,
     Fact,
+    GazeView,
     Observation,
     Override,
     Policy,
@@ -36,7 +37,7 @@ from shift_schemas.messages import (
     Versions,
 )
 from shift_schemas.suggestions import did_you_mean
-from shift_schemas.timestamps import Stamp
+from shift_schemas.timestamps import NS, Stamp
 from shift_study.loading import study_from_json
 from shift_study.phrases import text_for
 from shift_study.scoring import Reduction, reductions, view
@@ -72,6 +73,11 @@ class DeciderState:
     def records_own_choice(self) -> bool:
         """Whether an overridden decision records what SHIFT would have chosen: from format 5 on."""
         return self.format >= 5
+
+    @property
+    def records_gaze_quality(self) -> bool:
+        """Whether a decision names the age and the validity of the gaze that it rests on: from format 6 on."""
+        return self.format >= 6
 
 
 _STATE = TypeAdapter(DeciderState)
@@ -250,7 +256,15 @@ def decide(state: DeciderState, task: str, decision_id: str, required: Seen, now
         override_id=override.override_id if override else "", reason=override.reason if override else "",
         without_override=choices[choice.own] if override and state.records_own_choice else None,
         text=text_for(study.phrases, task, choices[choice.action]),
+        **(_gaze_quality(state.observation.gaze, now) if state.records_gaze_quality else {}),
     )  # fmt: skip
+
+
+def _gaze_quality(gaze: GazeView, now: Stamp) -> dict[str, float | None]:
+    """Return the age of the gaze (s) and its share of valid samples (0..1); both are None without gaze."""
+    if gaze.received is None:
+        return {}
+    return {"gaze_age_s": max(now.ns - gaze.received.ns, 0) / NS, "gaze_valid": gaze.valid}
 
 
 def _holding(state: DeciderState, required: Seen) -> tuple[str, ...]:

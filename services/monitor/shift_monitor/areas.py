@@ -53,6 +53,11 @@ def area_at(areas: Sequence[Area], x: float, y: float) -> int:
     return NOWHERE
 
 
+def areas_at(areas: Sequence[Area], x: float, y: float) -> list[int]:
+    """Return the indices of all areas that the point falls on; the first one is that of :func:`area_at`."""
+    return [i for i, area in enumerate(areas) if area_at((area,), x, y) != NOWHERE]
+
+
 def _inside(corners: tuple[tuple[float, float], ...], x: float, y: float) -> bool:
     """Apply the even-odd rule: a ray to the right from a point inside crosses the outline an odd number of times."""
     inside = False

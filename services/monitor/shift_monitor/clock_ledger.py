@@ -1,19 +1,31 @@
 """The ledger of a gaze source: what came, what did not, and how its clock runs beside the mesh's. Pure.
 
-It is recorded as a ``clock`` at the end of the session. Chunks that were repeated or refused leave no other trace in
-the recording; everything else in the ledger follows from the recorded chunks.
+It is recorded as a ``clock`` at the end of the session, where a segment begins, and every ten seconds. Chunks that were
+repeated or refused leave no other trace in the recording; everything else in the ledger follows from the recorded
+chunks.
+
+A segment ends where the source restarts its clock or its numbering, and where its clock jumps forward. The offset of a
+segment is the smallest difference between the mesh's clock when a chunk arrived and the source's clock, because that
+chunk had the shortest way. So the step between two segments is known to the length of that way.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from operator import sub
+from typing import NamedTuple
 
-from shift_schemas.messages import Clock, Seen
+from shift_schemas.messages import Clock, ClockSegment, GazeChunk, Seen
 from shift_schemas.timestamps import NS, Stamp
 
 SHORTEST_S = 10.0
 """Chosen: over a shorter time, the delays of single chunks are larger than the drift."""
+LEAST_JUMP_S = 1.0
+"""Chosen: a clock that is this much ahead of the mesh's after a gap jumped; networks delay chunks by less."""
+RECORDED_EVERY_NS = 10_000_000_000
+"""Chosen: a ledger on the page is at most this old, and costs one message in a hundred."""
+MOST_SEGMENTS = 32
+"""Chosen: the segments that a ledger lists; of older ones only the counts are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +47,17 @@ class Arrivals:
 NO_ARRIVALS = Arrivals()
 
 
+class EndedSegment(NamedTuple):
+    """A segment that has ended."""
+
+    number: int
+    samples: int
+    first_ns: int
+    last_ns: int
+    offset_ns: int
+    drift_ppm: float | None
+
+
 @dataclass(frozen=True, slots=True)
 class ClockLedger:
     """The account of one source. ``refused`` counts chunks by the kind of the error."""
@@ -52,13 +75,26 @@ class ClockLedger:
     longest_gap_ns: int = 0
     arrivals: Arrivals = NO_ARRIVALS
     """Those of the segment that goes on."""
+    first_ns: int = 0
+    """The first sample of that segment."""
+    segment_samples: int = 0
+    ended: tuple[EndedSegment, ...] = ()
+    """The last segments before it."""
+    recorded_ns: int = 0
+    """When the ledger was recorded last, by the mesh's clock; before that, when its first chunk came."""
+    round_trip_s: float | None = None
+    source_offset_s: float | None = None
 
 
 EMPTY_LEDGER = ClockLedger()
 
 
-def count_applied(ledger: ClockLedger, times: list[int], missing: int, restarted: bool, now: Stamp) -> ClockLedger:
+def count_applied(
+    ledger: ClockLedger, chunk: GazeChunk, times: list[int], missing: int, restarted: bool, now: Stamp
+) -> ClockLedger:
     """Return the ledger after a chunk with samples at ``times``, ns, before which so many chunks are missing."""
+    if chunk.round_trip_s is not None or chunk.offset_s is not None:
+        ledger = _with_measured(ledger, chunk)
     last_ns = None if restarted else ledger.last_ns
     before = times if last_ns is None else [last_ns, *times]
     gap_ns = max(map(sub, before[1:], before), default=0)
@@ -68,7 +104,46 @@ def count_applied(ledger: ClockLedger, times: list[int], missing: int, restarted
         ledger.chunks + 1, ledger.samples + len(times), ledger.late, ledger.missing + missing,
         ledger.restarts + restarted, ledger.repeated, ledger.refused, times[-1],
         ledger.span_ns + before[-1] - before[0], max(ledger.longest_gap_ns, gap_ns), arrivals,
+        times[0] if last_ns is None else ledger.first_ns,
+        len(times) + (0 if last_ns is None else ledger.segment_samples),
+        (*ledger.ended, _ended(ledger))[-MOST_SEGMENTS:] if restarted and ledger.chunks else ledger.ended,
+        ledger.recorded_ns or now.ns, ledger.round_trip_s, ledger.source_offset_s,
     )  # fmt: skip
+
+
+def _with_measured(ledger: ClockLedger, chunk: GazeChunk) -> ClockLedger:
+    """Return the ledger with what the source measured of its own clock."""
+    trips = [trip for trip in (ledger.round_trip_s, chunk.round_trip_s) if trip is not None]
+    offset_s = ledger.source_offset_s if chunk.offset_s is None else chunk.offset_s
+    return replace(ledger, round_trip_s=min(trips, default=None), source_offset_s=offset_s)
+
+
+def _ended(ledger: ClockLedger) -> EndedSegment:
+    """Return the segment that goes on as one that ends."""
+    return EndedSegment(
+        ledger.restarts, ledger.segment_samples, ledger.first_ns, ledger.last_ns or 0, ledger.arrivals.offset_ns,
+        _drift_ppm(ledger.arrivals),
+    )  # fmt: skip
+
+
+def jumps_forward(ledger: ClockLedger, first_ns: int, now: Stamp) -> bool:
+    """Return whether the source's clock jumped before a sample at ``first_ns`` that arrives now.
+
+    Between two chunks, the source's clock then went on by more than the mesh's clock did, at the pace of the segment
+    so far: a source that plays faster than real time has another pace.
+    """
+    arrivals = ledger.arrivals
+    if ledger.last_ns is None or arrivals.count < 2 or arrivals.latest_mesh < LEAST_JUMP_S:
+        return False
+    own = (ledger.last_ns - arrivals.first_ns) / NS
+    pace = arrivals.latest_mesh / own if own > 0 else 1.0
+    passed = (now.ns - arrivals.first_stamp_ns) / NS - arrivals.latest_mesh
+    return pace * (first_ns - ledger.last_ns) / NS - passed > LEAST_JUMP_S
+
+
+def is_due(ledger: ClockLedger, restarted: bool, now: Stamp) -> bool:
+    """Return whether the ledger is recorded after a chunk."""
+    return restarted or now.ns - ledger.recorded_ns >= RECORDED_EVERY_NS
 
 
 def _with_arrival(before: Arrivals, own_ns: int, now: Stamp) -> Arrivals:
@@ -97,8 +172,10 @@ def count_refused(ledger: ClockLedger, kind: str) -> ClockLedger:
     return replace(ledger, refused={**ledger.refused, kind: ledger.refused.get(kind, 0) + 1})
 
 
-def clock_fact(session: str, seen: Seen, source: str, ledger: ClockLedger, now: Stamp) -> Clock:
-    """Return the ledger as it is recorded."""
+def clock_fact(
+    session: str, seen: Seen, source: str, ledger: ClockLedger, now: Stamp, with_segments: bool = True
+) -> Clock:
+    """Return the ledger as it is recorded; ``with_segments`` from format 6 on."""
     arrivals, intervals = ledger.arrivals, ledger.samples - 1 - ledger.restarts
     return Clock(
         session=session, stamp=now, seen=seen, source=source, chunks=ledger.chunks, samples=ledger.samples,
@@ -108,7 +185,29 @@ def clock_fact(session: str, seen: Seen, source: str, ledger: ClockLedger, now: 
         longest_gap_s=ledger.longest_gap_ns / NS,
         offset_s=arrivals.offset_ns / NS if arrivals.count else None,
         drift_ppm=_drift_ppm(arrivals),
+        round_trip_s=ledger.round_trip_s, source_offset_s=ledger.source_offset_s,
+        segments=_segments(ledger) if with_segments else None,
     )  # fmt: skip
+
+
+def mark_recorded(ledger: ClockLedger, now: Stamp) -> ClockLedger:
+    """Return the ledger after it was recorded."""
+    return replace(ledger, recorded_ns=now.ns)
+
+
+def _segments(ledger: ClockLedger) -> list[ClockSegment]:
+    found: list[ClockSegment] = []
+    before: EndedSegment | None = None
+    for ended in (*ledger.ended, *([_ended(ledger)] if ledger.chunks else [])):
+        found.append(
+            ClockSegment(
+                segment=ended.number, samples=ended.samples, start_s=ended.first_ns / NS, end_s=ended.last_ns / NS,
+                offset_s=ended.offset_ns / NS, drift_ppm=ended.drift_ppm,
+                step_s=0.0 if before is None else (before.offset_ns - ended.offset_ns) / NS,
+            )
+        )  # fmt: skip
+        before = ended
+    return found
 
 
 def _drift_ppm(a: Arrivals) -> float | None:

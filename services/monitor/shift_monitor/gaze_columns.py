@@ -58,4 +58,7 @@ def gaze_chunk_of(fact: Gaze) -> GazeChunk:
         if fact.aoi
         else {"x": list(fact.x), "y": list(fact.y), "valid": fact.valid}
     )
-    return GazeChunk(source=fact.source, seq=fact.seq, t=fact.t, **columns, **eyes)
+    return GazeChunk(
+        source=fact.source, seq=fact.seq, t=fact.t, round_trip_s=fact.round_trip_s, offset_s=fact.offset_s, **columns,
+        **eyes,
+    )  # fmt: skip

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import Conflict
-from shift_schemas.messages import GazeChunk
+from shift_schemas.messages import Fact, GazeChunk
 from shift_schemas.timestamps import NS, Stamp
 
 from shift_monitor.attention import forget_run
@@ -22,13 +22,14 @@ from shift_monitor.chunk_sequence import (
     missing_chunks,
     sequence_from,
 )
-from shift_monitor.clock_ledger import count_applied, count_late, count_repeated
+from shift_monitor.clock_ledger import count_applied, count_late, count_repeated, jumps_forward, mark_recorded
 from shift_monitor.fixation import finish
 from shift_monitor.gaze_account import end_segment
 from shift_monitor.gaze_checks import check_rise, check_samples
 from shift_monitor.gaze_input import ChunkWithHistory, find_repeated
 from shift_monitor.gaze_stream import IDLE, GazeStream, apply_fixation_dwell, apply_names, apply_points
 from shift_monitor.gaze_warnings import (
+    clock_jump_warning,
     clock_restart_warning,
     jump_warnings,
     late_warning,
@@ -38,7 +39,15 @@ from shift_monitor.gaze_warnings import (
     share_warnings,
 )
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
-from shift_monitor.published import SourcedFixation, fixation_fact, gaze_fact, gaze_result, is_due, publish
+from shift_monitor.published import (
+    SourcedFixation,
+    fixation_fact,
+    gaze_fact,
+    gaze_result,
+    is_due,
+    publish,
+    running_clock_facts,
+)
 from shift_monitor.state import MonitorState, study_in_force, with_ledger
 
 MOST_SOURCES = 256
@@ -81,7 +90,7 @@ def step_gaze(state: MonitorState, gaze: ChunkWithHistory, now: Stamp, timed_out
     stream = state.stream
     if stream is None or stream.source != chunk.source:
         return _apply_chunk(_switch_source(state, chunk), chunk, times, now)
-    match _arrival(state, stream, gaze, times):
+    match _arrival(state, stream, gaze, times, now):
         case "late":
             return _record_late(state, stream, chunk, now)
         case "restart":
@@ -118,13 +127,17 @@ def _check_source(state: MonitorState, chunk: GazeChunk) -> None:
         raise Conflict(f"session {state.session} had {MOST_SOURCES} gaze sources replaced; it takes no more")
 
 
-def _arrival(state: MonitorState, stream: GazeStream, gaze: ChunkWithHistory, times: list[int]) -> Arrival:
+def _arrival(state: MonitorState, stream: GazeStream, gaze: ChunkWithHistory, times: list[int], now: Stamp) -> Arrival:
     seq, last_ns = gaze.chunk.seq, stream.last_ns
     used = any(e.segment == stream.segment for e in gaze.earlier)
     continues = last_ns is None or times[0] >= last_ns
     if state.format == 1 and seq <= stream.numbering.last and not used:
         return "late"  # format 1 does not look at the chunk's time
-    return classify_arrival(stream.numbering, seq, used, continues)
+    arrival = classify_arrival(stream.numbering, seq, used, continues)
+    ledger = state.ledgers.get(stream.source)
+    if arrival == "new" and state.format >= 6 and ledger is not None and jumps_forward(ledger, times[0], now):
+        return "restart"
+    return arrival
 
 
 def _switch_source(state: MonitorState, chunk: GazeChunk) -> Continuation:
@@ -141,7 +154,8 @@ def _begin_segment(state: MonitorState, stream: GazeStream, chunk: GazeChunk, ti
     sequence, segment = stream.numbering, stream.segment + 1
     if chunk.seq > sequence.last:
         assert stream.last_ns is not None
-        warning = clock_restart_warning(chunk.source, stream.last_ns, times[0], segment)
+        changed = clock_jump_warning if times[0] > stream.last_ns else clock_restart_warning
+        warning = changed(chunk.source, stream.last_ns, times[0], segment)
         sequence = ChunkSequence(sequence.last, chunk.seq)
     else:
         warning = number_restart_warning(chunk.source, sequence.last, chunk.seq, segment)
@@ -179,7 +193,7 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
     missing = missing_chunks(stream.numbering, chunk.seq)
     dropped = min(state.dropped + missing, LARGEST_COUNT)
     ledgers = with_ledger(
-        state, chunk.source, lambda ledger: count_applied(ledger, times, missing, onto.restarted, now)
+        state, chunk.source, lambda ledger: count_applied(ledger, chunk, times, missing, onto.restarted, now)
     )
     jumps = jump_warnings(stream.last_ns, times[0])
     spacings = next_spacings(stream.spacings, stream.last_ns, times)
@@ -195,7 +209,10 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
         samples=state.samples + len(times), received=now, gaze_warnings=warnings, held=True, ledgers=ledgers,
     )  # fmt: skip
     ended = [*onto.ended, *((chunk.source, stream.segment, f) for f in found)]
-    facts = (gaze_fact(after, chunk, now, "applied"), *(fixation_fact(after, f, now) for f in ended))
+    facts: tuple[Fact, ...] = (gaze_fact(after, chunk, now, "applied"), *(fixation_fact(after, f, now) for f in ended))
+    if clocks := running_clock_facts(after, chunk.source, onto.restarted, now):
+        facts = (*facts, *clocks)
+        after = replace(after, ledgers=with_ledger(after, chunk.source, lambda ledger: mark_recorded(ledger, now)))
     result = gaze_result(chunk, len(times), after.version + 1, warnings)
     return publish(after, now, facts, result) if is_due(after) else Step(after, facts, result)
 

@@ -25,6 +25,7 @@ from shift_monitor.gaze_account import (
 )
 from shift_monitor.gaze_columns import points_of
 from shift_monitor.prepared_study import PreparedStudy
+from shift_monitor.recent_samples import NO_SAMPLES, RecentSamples, count_recent
 
 UNREAD, IDLE = ChunkSequence(), Detector()
 """The sequence and the detector of a source before its first chunk."""
@@ -46,6 +47,8 @@ class GazeStream:
     account: GazeAccount = EMPTY_ACCOUNT
     spacings: tuple[int, ...] = ()
     """The last spacings of its samples, ns."""
+    recent: RecentSamples = NO_SAMPLES
+    """How many of its last samples were valid."""
 
 
 def apply_points(
@@ -58,8 +61,9 @@ def apply_points(
     detector, output = update(stream.detector, zip(times, points, strict=True), prepared.rule)
     attention, account = apply_fixation_dwell(attention, stream.account, output, prepared)
     account = count_samples(account, times, map(_kind, points), prepared.rule.gap_ns)
+    recent = count_recent(stream.recent, times, [p is not None for p in points])
     after = GazeStream(
-        stream.source, stream.numbering, times[-1], None, detector, stream.segment, account, stream.spacings
+        stream.source, stream.numbering, times[-1], None, detector, stream.segment, account, stream.spacings, recent
     )
     return after, attention, output.found
 
@@ -93,7 +97,8 @@ def apply_names(
             attention = mark_aoi_seen(attention)
     attention, account = _apply(dwells, attention, stream.account, prepared, gap_ns=0)
     account = count_samples(account, times, repeat(ON_STIMULUS, len(times)), longest_ns)
-    return replace(stream, last_ns=last_ns, named=named, account=account), attention
+    recent = count_recent(stream.recent, times, repeat(True, len(times)))
+    return replace(stream, last_ns=last_ns, named=named, account=account, recent=recent), attention
 
 
 def _apply(

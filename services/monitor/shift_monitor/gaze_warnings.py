@@ -88,6 +88,14 @@ def clock_restart_warning(source: str, before_ns: int, first_ns: int, segment: i
     )
 
 
+def clock_jump_warning(source: str, before_ns: int, first_ns: int, segment: int) -> str:
+    """Return the warning about a clock that was set forward."""
+    return (
+        f"the time of gaze source {source} jumps from {_s(before_ns)} to {_s(first_ns)} s, and less time passed here: "
+        f"segment {segment} of the source begins"
+    )
+
+
 def number_restart_warning(source: str, before: int, seq: int, segment: int) -> str:
     """Return the warning about a numbering that began again."""
     return (

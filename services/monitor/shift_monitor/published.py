@@ -21,14 +21,16 @@ from shift_schemas.messages import (
 )
 from shift_schemas.timestamps import NS, Stamp
 
-from shift_monitor.areas import area_at
+from shift_monitor import clock_ledger
+from shift_monitor.areas import area_at, areas_at
 from shift_monitor.attention import gaze_class
 from shift_monitor.awareness import awareness_views
-from shift_monitor.clock_ledger import clock_fact
+from shift_monitor.clock_ledger import ClockLedger, clock_fact
 from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_account import EMPTY_ACCOUNT, shares
 from shift_monitor.gaze_columns import recorded_columns
 from shift_monitor.prepared_study import name_of, prepare_study
+from shift_monitor.recent_samples import valid_share
 from shift_monitor.state import MonitorState, Shown
 
 SourcedFixation = tuple[str, int, EndedFixation]
@@ -92,6 +94,7 @@ def observation_of(state: MonitorState, now: Stamp) -> Observation:
             fixations=state.fixations,
             dropped=state.dropped,
             **(_gaze_quality(state, now) if state.format > 1 else {}),
+            valid=valid_share(state.stream.recent) if state.format >= 6 and state.stream is not None else None,
         ),
         awareness=awareness_views(state.awareness, study.awareness),
         warnings=[*state.gaze_warnings, *state.result_warnings],
@@ -103,6 +106,7 @@ def gaze_fact(state: MonitorState, chunk: GazeChunk, now: Stamp, outcome: GazeOu
     return Gaze(
         session=state.session, stamp=now, seen=_seen(state), source=chunk.source, seq=chunk.seq,
         segment=state.stream.segment if state.stream else 0, outcome=outcome, t=chunk.t, **recorded_columns(chunk),
+        round_trip_s=chunk.round_trip_s, offset_s=chunk.offset_s,
         warnings=list(state.gaze_warnings),
     )  # fmt: skip
 
@@ -114,13 +118,25 @@ def fixation_fact(state: MonitorState, ended: SourcedFixation, now: Stamp) -> Fi
     return Fixation(
         session=state.session, stamp=now, seen=_seen(state), source=source, segment=segment, start_s=start_ns / NS,
         duration_s=(end_ns - start_ns) / NS, x=x, y=y, aoi=name_of(prepared, area_at(prepared.areas, x, y)),
+        aois=[prepared.names[i] for i in areas_at(prepared.areas, x, y)] if state.format >= 6 else None,
     )  # fmt: skip
 
 
 def clock_facts(state: MonitorState, now: Stamp) -> tuple[Clock, ...]:
     """Return the ledgers of the sources as they are recorded, in the order of their first chunks."""
-    seen = _seen(state)
-    return tuple(clock_fact(state.session, seen, source, ledger, now) for source, ledger in state.ledgers.items())
+    return tuple(_clock_fact(state, source, ledger, now) for source, ledger in state.ledgers.items())
+
+
+def running_clock_facts(state: MonitorState, source: str, restarted: bool, now: Stamp) -> tuple[Clock, ...]:
+    """Return the ledger of a source after a chunk, if it is recorded now."""
+    ledger = state.ledgers.get(source)
+    if state.format < 6 or ledger is None or not clock_ledger.is_due(ledger, restarted, now):
+        return ()
+    return (_clock_fact(state, source, ledger, now),)
+
+
+def _clock_fact(state: MonitorState, source: str, ledger: ClockLedger, now: Stamp) -> Clock:
+    return clock_fact(state.session, _seen(state), source, ledger, now, with_segments=state.format >= 6)
 
 
 def gaze_result(chunk: GazeChunk, accepted: int, observation: int, warnings: tuple[str, ...]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from shift_schemas.errors import DamagedRecording, MalformedMessage
 from shift_schemas.lifecycle import has_ended
-from shift_schemas.messages import Session
+from shift_schemas.messages import Clock, Session
 from shift_schemas.timestamps import NS
 
 from shift_recording.checksum import Checksum, check
@@ -47,7 +47,7 @@ class RecordingInfo:
     counts: dict[str, int]
     gaze_samples: int
     clocks: list[dict[str, Any]]
-    """The ledger of each gaze source (topic ``clock``); empty before the session's end, and before format 5."""
+    """The last ledger of each gaze source (topic ``clock``); none is recorded before format 5."""
     attachments: dict[str, int]
     metadata: dict[str, dict[str, str]]
     checksum: str
@@ -71,7 +71,8 @@ class _Scanned:
     last: int = 0
     session: Session | None = None
     samples: int = 0
-    clocks: list[dict[str, Any]] = field(default_factory=list)
+    clocks: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """By source."""
     library: str = ""
     attachments: dict[str, int] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -83,8 +84,8 @@ class _Scanned:
             fact = fact_of(message.topic, message.data)
             if isinstance(fact, Session):
                 self.session = fact
-            else:
-                self.clocks.append(fact.model_dump(mode="json", exclude={"session", "stamp", "seen"}))
+            elif isinstance(fact, Clock):
+                self.clocks[fact.source] = fact.model_dump(mode="json", exclude={"session", "stamp", "seen"})
 
 
 def info_of(path: Path) -> RecordingInfo:
@@ -119,7 +120,7 @@ def info_of(path: Path) -> RecordingInfo:
         duration_s=_duration_s(fact, scanned),
         counts=dict(scanned.counts),
         gaze_samples=scanned.samples,
-        clocks=scanned.clocks,
+        clocks=list(scanned.clocks.values()),
         attachments=scanned.attachments,
         metadata=scanned.metadata,
         checksum=checksum,
@@ -145,11 +146,11 @@ def _from_index(index: Index) -> _Scanned | None:
             found.add(message)
     except (DamagedRecording, MalformedMessage):
         return None
-    if counts.get("gaze", 0) != sum(clock["chunks"] for clock in found.clocks):
+    if counts.get("gaze", 0) != sum(clock["chunks"] for clock in found.clocks.values()):
         return None  # a ledger counts what was applied; other chunks are recorded as well
     if found.session is None or found.session.ended is None:
         return None
-    found.samples = sum(clock["samples"] for clock in found.clocks)
+    found.samples = sum(clock["samples"] for clock in found.clocks.values())
     found.library = index.library
     found.report = Report(True, reason="", messages=sum(counts.values()))
     return found

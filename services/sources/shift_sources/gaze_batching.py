@@ -8,7 +8,7 @@ without a number are joined: chunks of ten carry 3.5 times as many samples a sec
 from __future__ import annotations
 
 from collections import OrderedDict, deque
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from shift_schemas.errors import FieldError, MalformedMessage, shorten
 from shift_schemas.messages import GazeChunk
@@ -77,11 +77,14 @@ class GazeBuffer:
 def join(arrivals: list[GazeArrival], seq: int) -> GazeChunk:
     """Return arrivals of one kind as one chunk with the number ``seq``."""
     first = arrivals[0].chunk
-    columns = {
+    columns: dict[str, Any] = {
         name: [value for a in arrivals for value in getattr(a.chunk, name)]
         for name in COLUMNS
         if getattr(first, name) is not None
     }
+    for name in ("round_trip_s", "offset_s"):
+        measured = [value for a in arrivals if (value := getattr(a.chunk, name)) is not None]
+        columns[name] = measured[-1] if measured else None
     return GazeChunk(source=first.source, seq=seq, **columns)
 
 

@@ -62,7 +62,7 @@ class MonitorFold(OutputFold):
         """Derive up to the owner's next fact. Raises :class:`Differs`, ``NotRecorded``."""
         self._last, self._before_show = placed, None
         if isinstance(placed.fact, Clock):
-            self.state = with_unrecorded(self.state, placed.fact)
+            self.state, self._stepped = with_unrecorded(self.state, placed.fact), None
         if not self.group:
             self._length, self._stepped = 0, None
             if isinstance(placed.fact, Gaze):

@@ -14,6 +14,7 @@ from shift_recording.export.tables import table_columns
 from shift_recording.mcap.reader import RecordedMessage
 from shift_schemas.codec import encode
 from shift_schemas.messages import Gaze, Session
+from shift_schemas.messages.monitor import EYE_COLUMNS
 from shift_schemas.timestamps import Stamp
 
 READER = gaze_reader(table_columns(Names())["gaze"], as_text=False)
@@ -30,6 +31,10 @@ def chunks(draw: st.DrawFn) -> Gaze:
         "source": draw(st.sampled_from(["tx", "ros"])), "seq": draw(st.integers(0, 9)), "t": t,
         "segment": draw(st.integers(0, 3)), "outcome": draw(st.sampled_from(["applied", "late"])),
     }  # fmt: skip
+    lost = {"pupil_left": 0.0, "pupil_right": 0.0, "openness_left": -1.0, "openness_right": -1.0}
+    for name in draw(st.sets(st.sampled_from(sorted(lost)))):
+        values = st.one_of(st.just(lost[name]), st.floats(0, 10, allow_subnormal=False))
+        same[name] = draw(st.lists(values, min_size=count, max_size=count))
     if draw(st.booleans()):
         names = st.sampled_from(["", "robot", "cup"])
         return Gaze(**same, aoi=draw(st.lists(names, min_size=count, max_size=count)))
@@ -56,8 +61,16 @@ def naive(facts: list[Gaze]) -> list[dict[str, Any]]:
                 "stamp_utc": fact.stamp.ns, "session_s": session_s, "t_s": t,
                 "x": fact.x[i] if seen else None, "y": fact.y[i] if seen else None,
                 "valid": fact.valid[i] if points else None, "aoi": None if points else fact.aoi[i],
+                **{name: of_eye(fact, name, i) for name in EYE_COLUMNS},
             })  # fmt: skip
     return rows
+
+
+def of_eye(fact: Gaze, name: str, i: int) -> float | None:
+    column = getattr(fact, name)
+    if column is None or column[i] < 0 or (column[i] == 0 and name.startswith("pupil")):
+        return None
+    return float(column[i])
 
 
 def messages(*payloads: bytes) -> list[RecordedMessage]:
@@ -97,6 +110,7 @@ def test_fields_that_an_old_format_leaves_out_have_their_defaults() -> None:
         ({"aoi": ["cup"]}, "t has 1 entries"),
         ({"t": [], "x": [], "y": [], "valid": []}, "t has 0 entries"),
         ({"x": [None]}, "x"),
+        ({"pupil_left": [3.0, 3.1]}, "pupil_left has 2"),
     ],
 )
 def test_nothing_is_read_behind_a_message_that_is_not_valid(change: dict[str, Any], named: str) -> None:

@@ -54,9 +54,10 @@ class Names:
     """The largest number of actions in a decision."""
 
 
-def short(name: str) -> str:
+def short(prefix: str, name: str) -> str:
     """Return the column's name: what an observation says of gaze has no prefix, except the gaze class."""
-    return name if name == "gaze_category" else name.removeprefix("gaze_")
+    whole = prefix + name
+    return whole if not prefix or whole == "gaze_category" else whole.removeprefix("gaze_")
 
 
 def columns_of(kind: type[BaseModel], names: Names, source: str, prefix: str = "") -> Iterator[Column]:
@@ -65,7 +66,7 @@ def columns_of(kind: type[BaseModel], names: Names, source: str, prefix: str = "
         if not prefix and name in ("session", "seen", "required", "actions"):
             continue
         meaning = info.description or ""
-        yield from _columns(_bare(info.annotation), names, source, short(prefix + name), meaning)
+        yield from _columns(_bare(info.annotation), names, source, short(prefix, name), meaning)
 
 
 def _columns(annotation: Any, names: Names, source: str, name: str, meaning: str) -> Iterator[Column]:
@@ -133,7 +134,7 @@ def values_of(message: BaseModel, prefix: str = "") -> dict[str, Any]:
 def _fields(kind: type[BaseModel], prefix: str) -> tuple[tuple[str, str], ...]:
     """Return the fields of a message, each with the name of its column."""
     left_out = () if prefix else ("session", "seen", "required", "actions")
-    return tuple((name, short(prefix + name)) for name in kind.model_fields if name not in left_out)
+    return tuple((name, short(prefix, name)) for name in kind.model_fields if name not in left_out)
 
 
 def _put(found: dict[str, Any], name: str, value: Any) -> None:
@@ -150,6 +151,6 @@ def _put(found: dict[str, Any], name: str, value: Any) -> None:
     elif isinstance(value, list) and value and isinstance(value[0], float):
         found.update((f"{SINGULAR.get(name, name)}_{n}", each) for n, each in enumerate(value, 1))
     elif isinstance(value, list):
-        found[name] = " | ".join(str(each) for each in value)
+        found[name] = " | ".join(each.model_dump_json() if isinstance(each, BaseModel) else str(each) for each in value)
     else:
         found[name] = value

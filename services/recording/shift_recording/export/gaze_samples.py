@@ -15,6 +15,7 @@ import pyarrow.json
 from shift_schemas.codec import encode
 from shift_schemas.errors import DamagedRecording, MalformedMessage
 from shift_schemas.messages import Gaze, Session
+from shift_schemas.messages.monitor import EYE_COLUMNS
 from shift_schemas.timestamps import NS
 
 from shift_recording.export.columns import Column
@@ -25,6 +26,7 @@ RECORDED = pa.schema([
     ("stamp", pa.struct([("sec", pa.int64()), ("nsec", pa.int64())])),
     ("t", pa.list_(pa.float64())), ("x", pa.list_(pa.float64())), ("y", pa.list_(pa.float64())),
     ("valid", pa.list_(pa.bool_())), ("aoi", pa.list_(pa.string())),
+    *((name, pa.list_(pa.float64())) for name in EYE_COLUMNS),
 ])  # fmt: skip
 """What is read of a message."""
 POINT = ("x", "y", "valid")
@@ -32,6 +34,8 @@ POINT = ("x", "y", "valid")
 
 
 NEEDED = ("source", "seq", "stamp", "t")
+LEAST_EYE = {name: 0.0 if name.startswith("openness") else float(np.nextafter(0.0, 1.0)) for name in EYE_COLUMNS}
+"""The least value that is not lost: a closed eye has the openness 0, and no pupil has the size 0."""
 
 
 class Samples(NamedTuple):
@@ -110,11 +114,12 @@ def _is_consistent(chunks: pa.Table) -> bool:
     stamps = chunks["stamp"].combine_chunks()
     if any(column.null_count for column in (*map(stamps.field, ("sec", "nsec")), *(chunks[n] for n in NEEDED))):
         return False
-    if any(chunks[name].combine_chunks().flatten().null_count for name in ("t", *POINT, "aoi")):
+    if any(chunks[name].combine_chunks().flatten().null_count for name in ("t", *POINT, "aoi", *EYE_COLUMNS)):
         return False
-    counts, *of_point, named = (
-        pc.fill_null(pc.list_value_length(chunks[name]), 0).to_numpy() for name in ("t", *POINT, "aoi")
-    )
+    counts, *of_point, named = (_lengths(chunks, name) for name in ("t", *POINT, "aoi"))
+    for name in EYE_COLUMNS:
+        if not bool(np.all((_lengths(chunks, name) == counts) | chunks[name].is_null().to_numpy())):
+            return False
     on_aoi = named > 0
     points = all(bool(np.all(length == np.where(on_aoi, 0, counts))) for length in of_point)
     return points and bool(np.all(counts > 0)) and bool(np.all(named == np.where(on_aoi, counts, 0)))
@@ -137,6 +142,9 @@ def _checked(messages: Iterable[RecordedMessage]) -> tuple[list[bytes], DamagedR
 def _check_lengths(fact: Gaze) -> None:
     lengths = {name: len(getattr(fact, name)) for name in ("t", *POINT, "aoi")}
     count = lengths.pop("t")
+    for name in EYE_COLUMNS:
+        if (column := getattr(fact, name)) is not None and len(column) != count:
+            raise MalformedMessage(f"t has {count} entries, and {name} has {len(column)}")
     if count == 0 or lengths not in (
         {**dict.fromkeys(POINT, count), "aoi": 0},
         {**dict.fromkeys(POINT, 0), "aoi": count},
@@ -157,6 +165,8 @@ def _varying(chunks: pa.Table, counts: Any, ns: Any, session: Session | None) ->
         "sample": pa.array(np.arange(total) - np.repeat(ends - counts, counts)), "t_s": pa.array(t),
         "valid": pa.array(valid, mask=named), "aoi": _flat(chunks, "aoi").take(pa.array(aoi, mask=~named)),
     }  # fmt: skip
+    for name, least in LEAST_EYE.items():
+        found[name] = _of_eye(chunks, name, counts, least)
     for name in ("x", "y"):
         found[name] = pa.array(_spread(_flat(chunks, name).to_numpy(), ~named), mask=lost)
     if session is None:
@@ -164,6 +174,17 @@ def _varying(chunks: pa.Table, counts: Any, ns: Any, session: Session | None) ->
     applied_s = (ns - session.started.ns) / NS
     before_s = np.repeat(t[ends - 1], counts) - t
     return found | {"session_s": pa.array(np.repeat(applied_s, counts) - before_s)}
+
+
+def _of_eye(chunks: pa.Table, name: str, counts: Any, least: float) -> pa.Array:
+    """Return a column of an eye; a value below ``least`` stands for a lost one."""
+    said = np.repeat(~chunks[name].is_null().to_numpy(), counts)
+    values = _spread(_flat(chunks, name).to_numpy(), said)
+    return pa.array(values, mask=~said | (values < least))
+
+
+def _lengths(chunks: pa.Table, name: str) -> Any:
+    return pc.fill_null(pc.list_value_length(chunks[name]), 0).to_numpy()
 
 
 def _flat(chunks: pa.Table, name: str) -> pa.Array:

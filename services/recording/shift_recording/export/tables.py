@@ -66,6 +66,13 @@ GAZE = (
     Column("y", "number", "Position, 0..1 from the top; empty for a lost sample and for gaze on AOIs.", "gaze"),
     Column("valid", "boolean", "Whether the sample is valid; empty for gaze on AOIs.", "gaze"),
     Column("aoi", "text", "The AOI that the source named; empty for points and for no AOI.", "gaze"),
+    *(
+        Column(
+            f"{what}_{eye}", "number", f"{meaning} of the {eye} eye, in the source's unit; empty where lost.", "gaze"
+        )
+        for what, meaning in (("pupil", "Pupil size"), ("openness", "Openness"))
+        for eye in ("left", "right")
+    ),
 )
 ABOUT_FILE = (
     Column("file", "text", "The recording.", ""),

@@ -59,9 +59,7 @@ def chunks(samples: Iterable[Sample], n: int, source: str = "file", named: bool 
 def chunk_of(samples: Sequence[Sample], source: str, seq: int, named: bool = False) -> GazeChunk:
     """Return the samples as one chunk. It has the columns of the eyes of which any sample says something."""
     eyes = {name: [getattr(s.eyes, name) for s in samples] for name in Eyes._fields}
-    columns: dict[str, list[Any]] = {
-        name: column for name, column in eyes.items() if any(v is not None for v in column)
-    }
+    columns: dict[str, Any] = {name: column for name, column in eyes.items() if any(v is not None for v in column)}
     if named:
         columns["aoi"] = [s.aoi for s in samples]
     else:
