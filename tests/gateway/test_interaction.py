@@ -214,7 +214,7 @@ async def test_observation_has_every_field(mesh: Mesh) -> None:
     assert fresh["gaze"] == {
         "category": "uncertain", "weights": {"robot": 0.5, "cup": 0.5}, "focus_shift": 0.0, "aoi": None, "fixations": 0,
         "dropped": 0, "restarts": 0, "samples": 0, "dwell_s": 0.0, "lost": 0.0, "unclassified": 0.0, "off_aoi": 0.0,
-        "off_stimulus": 0.0, "received": None, "age_s": None,
+        "off_stimulus": 0.0, "valid": None, "received": None, "age_s": None,
     }  # fmt: skip
     assert fresh["warnings"] == []
     assert fresh["awareness"] == {}

@@ -8,9 +8,11 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shift_monitor.areas import Area
 from shift_monitor.attention import Attention, initial_attention
 from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_stream import GazeStream, apply_points
+from shift_monitor.moving_areas import AreasOverTime, Layout
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 from shift_schemas.messages import GazeChunk
 from shift_schemas.timestamps import NS
@@ -60,15 +62,19 @@ def pieces(chunk: GazeChunk, sizes: list[int]) -> list[GazeChunk]:
     ]
 
 
-def fold_fast(onto: Folded, chunk: GazeChunk, prepared: PreparedStudy) -> Folded:
+def fold_fast(onto: Folded, chunk: GazeChunk, prepared: PreparedStudy, areas: AreasOverTime | None = None) -> Folded:
     times = [round(t * NS) for t in chunk.t]
-    stream, attention, found = apply_points(onto[0], onto[1], times, chunk, prepared)
+    stream, attention, found = apply_points(
+        onto[0], onto[1], times, chunk, prepared, areas or AreasOverTime(prepared.areas)
+    )
     return stream, attention, [*onto[2], *found]
 
 
-def fold_slowly(onto: Folded, chunk: GazeChunk, prepared: PreparedStudy) -> Folded:
+def fold_slowly(onto: Folded, chunk: GazeChunk, prepared: PreparedStudy, areas: AreasOverTime | None = None) -> Folded:
     times = [round(t * NS) for t in chunk.t]
-    stream, attention, found = slow_gaze.apply_points(onto[0], onto[1], times, chunk, prepared)
+    stream, attention, found = slow_gaze.apply_points(
+        onto[0], onto[1], times, chunk, prepared, areas or AreasOverTime(prepared.areas)
+    )
     return stream, attention, [*onto[2], *found]
 
 
@@ -89,6 +95,27 @@ def test_chunk_gives_what_its_samples_give_one_by_one(
     for i, chunk in enumerate(chunks):
         prepared = changes[i * len(changes) // len(chunks)]
         fast, slow = fold_fast(fast, chunk, prepared), fold_slowly(slow, chunk, prepared)
+        assert fast == slow
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    rate_hz=st.sampled_from([60.0, 300.0]),
+    sizes=st.lists(st.integers(1, 40), min_size=1, max_size=5),
+)
+def test_moving_areas_are_those_of_each_sample(seed: int, rate_hz: float, sizes: list[int]) -> None:
+    rng, prepared = random.Random(seed), STUDIES[0]
+    layouts = []
+    for n in range(60):
+        left, top = rng.uniform(-0.2, 0.8), rng.uniform(-0.2, 0.8)
+        moving = Area(left, top, left + 0.4, top + 0.4)
+        layouts.append(Layout(round(n / 30 * NS), (moving, *prepared.areas[1:])))
+    areas = AreasOverTime(prepared.areas, tuple(layouts))
+    fast: Folded = GazeStream("eyes"), initial_attention(len(AREAS)), []
+    slow = fast
+    for chunk in pieces(wandering(seed, 400, rate_hz, 0.02), sizes):
+        fast, slow = fold_fast(fast, chunk, prepared, areas), fold_slowly(slow, chunk, prepared, areas)
         assert fast == slow
 
 

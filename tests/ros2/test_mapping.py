@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from shift_ros2.mapping import (
+    aois_of,
     gaze_of,
     performance_of,
     task_of,
@@ -128,3 +129,18 @@ def test_an_observation_on_its_topic_is_that_of_rest() -> None:
         gaze=GazeView(category="focused", weights={"a": 1.0}, focus_shift=0.0, aoi="", fixations=0, dropped=0),
     )  # fmt: skip
     assert json.loads(text_of_fact(fact, fact.model_dump_json()))["gaze"]["aoi"] is None
+
+
+def test_aois_that_move_get_what_the_message_leaves_out() -> None:
+    moved = [{"name": "cup", "rectangle": [0.1, 0.2, 0.3, 0.4]}]
+    found = aois_of(json.dumps({"aois": moved, "session": "s2"}), "ros", NOW_S)
+    assert found.session == "s2"
+    assert (found.positions.source, found.positions.t, found.positions.seq) == ("ros", NOW_S, 1_000_000)
+    given = {"source": "tx300", "t": 1.25, "seq": 3, "aois": [{"name": "cup", "visible": False}]}
+    assert aois_of(json.dumps(given), "ros", NOW_S).positions.model_dump(exclude_unset=True) == given
+
+
+def test_mistakes_in_aois_are_said_with_field_and_rule() -> None:
+    with pytest.raises(MalformedMessage, match="less than or equal to 2") as e:
+        aois_of(json.dumps({"aois": [{"name": "cup", "rectangle": [10, 20, 300, 400]}]}), "ros", NOW_S)
+    assert e.value.errors[0].field == "aois.0.rectangle.0"

@@ -64,7 +64,7 @@ async def test_missing_service_is_a_failure_that_names_it(bus: MemoryBus) -> Non
     with pytest.raises(Unavailable, match="the decider does not answer"):
         await client.command(DECIDE)
     with pytest.raises(Unavailable, match="the monitor does not answer"):
-        await client.gaze("s1", GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["left"]))
+        await client.send("s1", GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["left"]))
 
 
 async def test_silent_service_is_a_failure_that_names_it(bus: MemoryBus) -> None:
@@ -109,7 +109,7 @@ async def test_session_that_is_not_an_id_is_refused_before_a_request(bus: Memory
     chunk = GazeChunk(source="eyes", seq=0, t=[0.0], aoi=["left"])
     for hostile in ("**", "*", "a/b", "../x", "a\0", "x" * 64, ""):
         with pytest.raises(MalformedMessage):
-            await MeshClient([bus]).gaze(hostile, chunk)
+            await MeshClient([bus]).send(hostile, chunk)
 
 
 async def test_health_is_none_and_metrics_are_empty_without_an_answer(bus: MemoryBus) -> None:

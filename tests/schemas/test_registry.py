@@ -39,7 +39,7 @@ def test_each_fact_and_each_command_has_exactly_one_owner() -> None:
 
 def test_topics_are_in_the_contract_s_order() -> None:
     assert SUBJECTS == tuple(FACTS) == (
-        "session", "config", "gaze", "clock", "fixation", "observation", "estimate", "decision", "override",
+        "session", "config", "gaze", "aois", "clock", "fixation", "observation", "estimate", "decision", "override",
         "performance", "transition", "policy", "marker",
     )  # fmt: skip
 
@@ -47,7 +47,7 @@ def test_topics_are_in_the_contract_s_order() -> None:
 def test_tables_are_in_the_order_of_the_owners() -> None:
     assert OWNERS == {
         "recorder": ("session", "config", "marker"),
-        "monitor": ("gaze", "clock", "fixation", "observation"),
+        "monitor": ("gaze", "aois", "clock", "fixation", "observation"),
         "decider": ("estimate", "decision", "override"),
         "learner": ("performance", "transition", "policy"),
     }
@@ -57,7 +57,7 @@ def test_tables_are_in_the_order_of_the_owners() -> None:
         "decider": ("decide", "override"),
         "learner": ("report_performance",),
     }
-    assert STREAMS == {"gaze": "monitor"}
+    assert STREAMS == {"gaze": "monitor", "aois": "monitor"}
 
 
 def test_service_reads_the_owner_of_each_subject_that_it_steps_on() -> None:

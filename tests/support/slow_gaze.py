@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from shift_model.attention import lowered_focus_shift, next_weights, raised_focus_shift
-from shift_monitor.areas import NOWHERE, area_at
+from shift_monitor.areas import NOWHERE, Area, area_at
 from shift_monitor.attention import Attention
 from shift_monitor.fixation import (
     LONGEST_CANDIDATE,
@@ -22,6 +22,7 @@ from shift_monitor.fixation import (
 from shift_monitor.gaze_account import LOST, OFF_STIMULUS, ON_STIMULUS, GazeAccount, count_dwell, count_samples
 from shift_monitor.gaze_stream import GazeStream
 from shift_monitor.median import LONGEST_WINDOW, MedianWindow, Point
+from shift_monitor.moving_areas import AreasOverTime
 from shift_monitor.prepared_study import PreparedStudy
 from shift_monitor.recent_samples import count_recent
 from shift_schemas.messages import GazeChunk
@@ -32,8 +33,9 @@ EMPTY = MedianWindow()
 
 
 def apply_points(
-    stream: GazeStream, attention: Attention, times: list[int], chunk: GazeChunk, prepared: PreparedStudy
-) -> tuple[GazeStream, Attention, list[EndedFixation]]:
+    stream: GazeStream, attention: Attention, times: list[int], chunk: GazeChunk, prepared: PreparedStudy,
+    areas: AreasOverTime,
+) -> tuple[GazeStream, Attention, list[EndedFixation]]:  # fmt: skip
     """Apply points one after another, as ``shift_monitor.gaze_stream.apply_points`` does all at once."""
     found: list[EndedFixation] = []
     detector, account = stream.detector, stream.account
@@ -41,10 +43,10 @@ def apply_points(
     for i, t_ns in enumerate(times):
         point = _point(chunk, i)
         kinds.append(_kind(point))
-        if point is not None and area_at(prepared.areas, *point) != NOWHERE:
+        if point is not None and area_at(areas_at_time(areas, t_ns), *point) != NOWHERE:
             attention = attention._replace(aoi_seen=True)
         detector, output = update(detector, t_ns, point, prepared.rule)
-        attention, account = _apply_fixation_dwell(attention, account, output, prepared)
+        attention, account = _apply_fixation_dwell(attention, account, output, prepared, areas)
         found += output.found
     account = count_samples(account, times, kinds, prepared.rule.gap_ns)
     recent = stream.recent
@@ -68,14 +70,23 @@ def _kind(point: tuple[float, float] | None) -> int:
     return ON_STIMULUS if 0.0 <= point[0] <= 1.0 and 0.0 <= point[1] <= 1.0 else OFF_STIMULUS
 
 
+def areas_at_time(areas: AreasOverTime, t_ns: int) -> tuple[Area, ...]:
+    """Return the areas of the last layout that began by then."""
+    held = areas.first
+    for since_ns, layout in areas.layouts:
+        if since_ns <= t_ns:
+            held = layout
+    return held
+
+
 def _apply_fixation_dwell(
-    attention: Attention, account: GazeAccount, output: FixationUpdate, prepared: PreparedStudy
+    attention: Attention, account: GazeAccount, output: FixationUpdate, prepared: PreparedStudy, areas: AreasOverTime
 ) -> tuple[Attention, GazeAccount]:
     """Apply the dwell of the samples inside a fixation, each on the AOI at its filtered position."""
     rule, settings = prepared.rule, prepared.study.attention
     on_aoi_ns = off_aoi_ns = 0
     for t_ns, x, y, duration_ns in output.dwells:
-        target = area_at(prepared.areas, x, y)
+        target = area_at(areas_at_time(areas, t_ns), x, y)
         if target == NOWHERE:
             off_aoi_ns += duration_ns
         else:

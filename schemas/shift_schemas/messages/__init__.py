@@ -47,6 +47,9 @@ from shift_schemas.messages.mesh import (
     ReplayStatus,
 )
 from shift_schemas.messages.monitor import (
+    AoiPosition,
+    AoiPositions,
+    Aois,
     AwarenessView,
     CapacityView,
     Clock,
@@ -56,6 +59,7 @@ from shift_schemas.messages.monitor import (
     GazeChunk,
     GazeView,
     Observation,
+    PlacedAoi,
 )
 from shift_schemas.messages.recorder import (
     END_ID,
@@ -78,6 +82,9 @@ __all__ = [
     "MOST_WARNINGS",
     "START_ID",
     "Answer",
+    "AoiPosition",
+    "AoiPositions",
+    "Aois",
     "AwarenessView",
     "CapacityView",
     "Clock",
@@ -109,6 +116,7 @@ __all__ = [
     "PatchBody",
     "Performance",
     "PerformanceBody",
+    "PlacedAoi",
     "Policy",
     "PolicyRow",
     "RepeatWording",

@@ -40,6 +40,31 @@ class Gaze(Fact):
     warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake or has no effect.")
 
 
+class PlacedAoi(Message):
+    """Where an AOI is from a time on, as it is recorded: numbers only, and an empty list where it has no such shape."""
+
+    name: Id = Field(description="The AOI.")
+    visible: bool = Field(description="Whether gaze can fall on it.")
+    rectangle: list[float] = Field(default=[], description="left, top, right, bottom; empty for a polygon.")
+    polygon_x: list[float] = Field(default=[], description="The corners' x; empty for a rectangle.")
+    polygon_y: list[float] = Field(default=[], description="The corners' y; empty for a rectangle.")
+
+
+class Aois(Fact):
+    """Areas of interest that moved, as they were applied. An AOI that is not named stays where it is."""
+
+    owner = "monitor"
+    subject = "aois"
+
+    source: Id = Field(description="The gaze source on whose clock they move.")
+    seq: Count = Field(description="Number of the message within its source, from 0.")
+    segment: Count = Field(default=0, description="Counts the restarts of the time or the numbering.")
+    outcome: GazeOutcome = Field(default="applied", description="late: recorded, not applied.")
+    t: Seconds = Field(description="From when on they hold, source clock, s.")
+    aois: list[PlacedAoi] = Field(description="The AOIs that the message names.")
+    warnings: Warnings = Field(default=[], description="What was accepted but may be a mistake or has no effect.")
+
+
 class ClockSegment(Message):
     """What a source sent between two restarts or jumps of its clock."""
 
@@ -210,4 +235,58 @@ class GazeChunk(StreamItem):
             for i, ok in enumerate(self.valid):
                 if ok and (self.x[i] is None or self.y[i] is None):
                     raise ValueError(f"sample {i} is valid and has no x or y")
+        return self
+
+
+Coordinate = Annotated[float, Field(ge=-1.0, le=2.0)]
+"""0..1 on the stimulus; an AOI that moves may be up to one stimulus beside it, as gaze may."""
+
+
+class AoiPosition(Message):
+    """Where an AOI is from a time on: a rectangle, a polygon, or not visible."""
+
+    name: Id = Field(description="An AOI of the study.")
+    rectangle: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] | None = Field(
+        default=None, description="left, top, right, bottom; 0..1 from the upper left corner, at most -1..2."
+    )
+    polygon: (
+        Annotated[
+            list[Annotated[list[Coordinate], Field(min_length=2, max_length=2)]], Field(min_length=3, max_length=256)
+        ]
+        | None
+    ) = Field(default=None, description="The corners, [x, y] each.")
+    visible: bool = Field(
+        default=True, description="false: gaze does not fall on it. true without a shape: it is where it was last."
+    )
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> AoiPosition:
+        if self.rectangle is not None and self.polygon is not None:
+            raise ValueError(f"{self.name}: give either rectangle or polygon")
+        if self.rectangle is not None:
+            left, top, right, bottom = self.rectangle
+            if not (left < right and top < bottom):
+                raise ValueError(f"{self.name}: rectangle is left, top, right, bottom: left < right and top < bottom")
+        if self.rectangle is None and self.polygon is None and "visible" not in self.model_fields_set:
+            raise ValueError(f"{self.name}: give rectangle, polygon, or visible: false")
+        return self
+
+
+class AoiPositions(StreamItem):
+    """Areas of interest that moved, as a source sends them. An AOI that is not named stays where it is."""
+
+    owner = "monitor"
+    stream = "aois"
+
+    source: Id = Field(description="The gaze source on whose clock they move.")
+    seq: Count = Field(description="Number of the message within its source, from 0.")
+    t: Seconds = Field(description="From when on they hold; seconds of the gaze source's clock.")
+    aois: Annotated[list[AoiPosition], Field(min_length=1, max_length=64)]
+
+    @model_validator(mode="after")
+    def _names_once(self) -> AoiPositions:
+        names = [aoi.name for aoi in self.aois]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"aois names {twice} twice; one position holds at a time")
         return self

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from shift_monitor.area_step import PositionsWithHistory
 from shift_monitor.gaze_input import ChunkWithHistory
 from shift_recording.mcap.reader import Recording
 from shift_recording.provenance import STUDY
@@ -22,6 +23,7 @@ from shift_runtime.rest_client import RestClient
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import DamagedRecording
 from shift_schemas.messages import (
+    AoiPositions,
     Config,
     Configure,
     Decision,
@@ -43,7 +45,7 @@ from shift_study.loading import as_recorded
 from shift_study.patching import merge_patch_between
 from shift_verify.verify import Observers, verify
 
-Kind = Literal["gaze", "config", "decision", "performance", "override", "marker"]
+Kind = Literal["gaze", "aois", "config", "decision", "performance", "override", "marker"]
 
 
 @dataclass(frozen=True)
@@ -165,6 +167,8 @@ class _Ordered:
         match event:
             case ChunkWithHistory():
                 self.out.append(RecordedInput("gaze", now, event.chunk))
+            case PositionsWithHistory():
+                self.out.append(RecordedInput("aois", now, event.positions))
             case Config() if event.version > self.configured:
                 self._configure(event)
             case Performance():
@@ -241,6 +245,8 @@ def _give(rest: RestClient, session: str, each: RecordedInput, result: ReplayedD
     match content:
         case GazeChunk():
             rest.gaze(session, content)
+        case AoiPositions():
+            rest.aois(session, content)
         case Decision():
             answer = rest.decide(session, content.task, content.decision_id)
             result.made += 1

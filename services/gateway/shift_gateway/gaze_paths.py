@@ -1,4 +1,4 @@
-"""The paths of the gaze stream: a chunk in each POST, or in each message of a WebSocket."""
+"""The paths of the streams: gaze, a chunk in each POST or in each message of a WebSocket, and AOIs that move."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi import FastAPI, Request, WebSocket, WebSocketDisconnect
 from shift_schemas.errors import ShiftError, check_id
-from shift_schemas.messages import GazeChunk
+from shift_schemas.messages import AoiPositions, GazeChunk
 
 from shift_gateway.gateway import Gateway
 from shift_gateway.openapi import documented_body
@@ -23,6 +23,15 @@ def add_gaze(app: FastAPI, gateway: Gateway) -> None:
         """Send a chunk of gaze, points or AOI names."""
         await gateway.read_model.view(check_id("session", session))
         return await gateway.api.gaze(session, await read_body(request, GazeChunk))
+
+    @app.post(
+        "/v1/sessions/{session}/aois", status_code=202, tags=["interaction"],
+        openapi_extra=documented_body(AoiPositions),
+    )  # fmt: skip
+    async def post_aois(session: str, request: Request) -> dict[str, Any]:
+        """Move areas of interest, from a time of the gaze source's clock on."""
+        await gateway.read_model.view(check_id("session", session))
+        return await gateway.api.aois(session, await read_body(request, AoiPositions))
 
     @app.websocket("/v1/sessions/{session}/gaze")
     async def stream_gaze(socket: WebSocket, session: str) -> None:

@@ -16,19 +16,20 @@ from dataclasses import dataclass, replace
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import ShiftError, UnknownThing
 from shift_schemas.lifecycle import accepts_input
-from shift_schemas.messages import Config, Decision, GazeChunk, Performance, Session
+from shift_schemas.messages import AoiPositions, Config, Decision, GazeChunk, Performance, Session
 from shift_schemas.timestamps import Stamp
 
+from shift_monitor.area_step import PositionsWithHistory, step_positions
 from shift_monitor.attention import initial_attention
 from shift_monitor.awareness import History, add_result, correct_result
 from shift_monitor.capacity import Capacity, apply_strategy
 from shift_monitor.clock_ledger import count_refused
 from shift_monitor.gaze_columns import gaze_chunk_of
 from shift_monitor.gaze_input import ChunkWithHistory
-from shift_monitor.gaze_step import MOST_SOURCES, close_stream, step_gaze
+from shift_monitor.gaze_step import close_stream, step_gaze
 from shift_monitor.prepared_study import prepare_study
 from shift_monitor.published import clock_facts, fixation_fact, observation_of, publish
-from shift_monitor.state import MonitorState, dump, initial, load, study_in_force, with_ledger
+from shift_monitor.state import MOST_SOURCES, MonitorState, dump, initial, load, study_in_force, with_ledger
 
 __all__ = [
     "MonitorState",
@@ -73,9 +74,9 @@ def step(state: MonitorState | None, event: object, now: Stamp, timed_out: bool 
     InputsMissing
         The session's configuration has not come yet; ``Unavailable`` instead if ``timed_out`` is set.
     Conflict
-        Gaze for an ended session or from a source that was replaced.
+        Gaze or moving AOIs for an ended session or from a source that was replaced.
     MalformedMessage
-        Gaze on an AOI that the study does not have, or whose time does not rise.
+        Gaze on an AOI that the study does not have, such an AOI that moves, or gaze whose time does not rise.
     """
     if isinstance(event, Session):
         return _on_session(state, event, now)
@@ -92,6 +93,10 @@ def step(state: MonitorState | None, event: object, now: Stamp, timed_out: bool 
             return step_gaze(state, event, now, timed_out)
         case GazeChunk():
             return step_gaze(state, ChunkWithHistory(event), now, timed_out)
+        case PositionsWithHistory():
+            return step_positions(state, event, now, timed_out)
+        case AoiPositions():
+            return step_positions(state, PositionsWithHistory(event), now, timed_out)
         case Show():
             return publish(state, now) if state.held else Step(state)
     return Step(state)

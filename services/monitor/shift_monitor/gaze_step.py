@@ -27,7 +27,14 @@ from shift_monitor.fixation import finish
 from shift_monitor.gaze_account import end_segment
 from shift_monitor.gaze_checks import check_rise, check_samples
 from shift_monitor.gaze_input import ChunkWithHistory, find_repeated
-from shift_monitor.gaze_stream import IDLE, GazeStream, apply_fixation_dwell, apply_names, apply_points
+from shift_monitor.gaze_stream import (
+    IDLE,
+    GazeStream,
+    apply_fixation_dwell,
+    apply_names,
+    apply_points,
+    oldest_needed_ns,
+)
 from shift_monitor.gaze_warnings import (
     clock_jump_warning,
     clock_restart_warning,
@@ -38,6 +45,7 @@ from shift_monitor.gaze_warnings import (
     rate_warnings,
     share_warnings,
 )
+from shift_monitor.moving_areas import AreaTrack, begun_again, forgotten_before
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 from shift_monitor.published import (
     SourcedFixation,
@@ -48,10 +56,7 @@ from shift_monitor.published import (
     publish,
     running_clock_facts,
 )
-from shift_monitor.state import MonitorState, study_in_force, with_ledger
-
-MOST_SOURCES = 256
-"""Chosen: the most gaze sources of one session; each is remembered, so that a former one can be refused."""
+from shift_monitor.state import MOST_SOURCES, MonitorState, areas_over_time, study_in_force, with_ledger
 
 LARGEST_COUNT = 2**53
 """The largest count in a message (shift_schemas.messages)."""
@@ -106,14 +111,15 @@ def close_stream(state: MonitorState) -> tuple[MonitorState, list[SourcedFixatio
         return state, []
     prepared, stream = prepare_study(state.study), state.stream
     output = finish(stream.detector, prepared.rule)
-    attention, account = apply_fixation_dwell(state.attention, stream.account, output, prepared)
+    areas = areas_over_time(state, stream.source, prepared)
+    attention, account = apply_fixation_dwell(state.attention, stream.account, output, prepared, areas)
     after = replace(
         state,
         attention=forget_run(attention),
         stream=replace(stream, named=None, detector=IDLE, account=account),
         fixations=state.fixations + len(output.found),
     )
-    return after, [(stream.source, stream.segment, f) for f in output.found]
+    return after, [SourcedFixation(stream.source, stream.segment, f, areas) for f in output.found]
 
 
 # --- which stream a chunk belongs to ---
@@ -160,9 +166,26 @@ def _begin_segment(state: MonitorState, stream: GazeStream, chunk: GazeChunk, ti
     else:
         warning = number_restart_warning(chunk.source, sequence.last, chunk.seq, segment)
         sequence = sequence_from(chunk.seq)
-    after = replace(state, restarts=state.restarts + 1)
+    after = replace(state, restarts=state.restarts + 1, tracks=_tracks_in(state, stream.source, segment))
     begun = GazeStream(stream.source, sequence, segment=segment, account=end_segment(stream.account))
     return Continuation(after, begun, ended, [warning], restarted=True)
+
+
+def _tracks_in(state: MonitorState, source: str, segment: int) -> dict[str, AreaTrack]:
+    """Return the moving areas where a segment begins. Areas that are on its clock already stay as they are."""
+    track = state.tracks.get(source)
+    if track is None:
+        return state.tracks
+    begun = track._replace(clock_segment=segment) if track.clock_segment >= segment else begun_again(track, segment)
+    return {**state.tracks, source: begun}
+
+
+def _without_old_areas(state: MonitorState, stream: GazeStream) -> MonitorState:
+    """Return the state without the places of moving areas that no later sample is tested against."""
+    track, needed_ns = state.tracks.get(stream.source), oldest_needed_ns(stream)
+    if track is None or needed_ns is None:
+        return state
+    return replace(state, tracks={**state.tracks, stream.source: forgotten_before(track, needed_ns)})
 
 
 def _continue_stream(state: MonitorState, stream: GazeStream, chunk: GazeChunk) -> Continuation:
@@ -198,8 +221,9 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
     jumps = jump_warnings(stream.last_ns, times[0])
     spacings = next_spacings(stream.spacings, stream.last_ns, times)
     stream = replace(stream, numbering=advance(stream.numbering, chunk.seq), spacings=spacings)
+    areas = areas_over_time(state, chunk.source, prepared)
     if chunk.aoi is None:
-        stream, attention, found = apply_points(stream, state.attention, times, chunk, prepared)
+        stream, attention, found = apply_points(stream, state.attention, times, chunk, prepared, areas)
     else:
         stream, attention, found = *apply_names(stream, state.attention, times, chunk.aoi, prepared), []
     quality = _quality_warnings(stream, chunk.aoi is None, prepared)
@@ -208,8 +232,9 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
         state, stream=stream, attention=attention, dropped=dropped, fixations=state.fixations + len(found),
         samples=state.samples + len(times), received=now, gaze_warnings=warnings, held=True, ledgers=ledgers,
     )  # fmt: skip
-    ended = [*onto.ended, *((chunk.source, stream.segment, f) for f in found)]
+    ended = [*onto.ended, *(SourcedFixation(chunk.source, stream.segment, f, areas) for f in found)]
     facts: tuple[Fact, ...] = (gaze_fact(after, chunk, now, "applied"), *(fixation_fact(after, f, now) for f in ended))
+    after = _without_old_areas(after, stream)
     if clocks := running_clock_facts(after, chunk.source, onto.restarted, now):
         facts = (*facts, *clocks)
         after = replace(after, ledgers=with_ledger(after, chunk.source, lambda ledger: mark_recorded(ledger, now)))

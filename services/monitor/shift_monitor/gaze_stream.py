@@ -24,6 +24,7 @@ from shift_monitor.gaze_account import (
     count_samples,
 )
 from shift_monitor.gaze_columns import points_of
+from shift_monitor.moving_areas import AreasOverTime
 from shift_monitor.prepared_study import PreparedStudy
 from shift_monitor.recent_samples import NO_SAMPLES, RecentSamples, count_recent
 
@@ -52,14 +53,17 @@ class GazeStream:
 
 
 def apply_points(
-    stream: GazeStream, attention: Attention, times: list[int], chunk: GazeChunk, prepared: PreparedStudy
-) -> tuple[GazeStream, Attention, list[EndedFixation]]:
+    stream: GazeStream, attention: Attention, times: list[int], chunk: GazeChunk, prepared: PreparedStudy,
+    areas: AreasOverTime,
+) -> tuple[GazeStream, Attention, list[EndedFixation]]:  # fmt: skip
     """Apply points through fixation detection; only samples inside a fixation count as dwell."""
-    points, areas = points_of(chunk), prepared.areas
-    if not attention.aoi_seen and any(p is not None and area_at(areas, *p) != NOWHERE for p in points):
+    points = points_of(chunk)
+    if not attention.aoi_seen and any(
+        p is not None and area_at(areas.at(t_ns), *p) != NOWHERE for t_ns, p in zip(times, points, strict=True)
+    ):
         attention = mark_aoi_seen(attention)
     detector, output = update(stream.detector, zip(times, points, strict=True), prepared.rule)
-    attention, account = apply_fixation_dwell(attention, stream.account, output, prepared)
+    attention, account = apply_fixation_dwell(attention, stream.account, output, prepared, areas)
     account = count_samples(account, times, map(_kind, points), prepared.rule.gap_ns)
     recent = count_recent(stream.recent, times, [p is not None for p in points])
     after = GazeStream(
@@ -75,12 +79,28 @@ def _kind(point: tuple[float, float] | None) -> int:
 
 
 def apply_fixation_dwell(
-    attention: Attention, account: GazeAccount, output: FixationUpdate, prepared: PreparedStudy
+    attention: Attention, account: GazeAccount, output: FixationUpdate, prepared: PreparedStudy, areas: AreasOverTime
 ) -> tuple[Attention, GazeAccount]:
-    """Apply the dwell of the samples inside a fixation, each on the AOI at its filtered position."""
-    rule, areas = prepared.rule, prepared.areas
-    dwells = [Dwell(area_at(areas, x, y), t_ns, duration_ns) for t_ns, x, y, duration_ns in output.dwells]
-    return _apply(dwells, attention, account, prepared, gap_ns=rule.gap_ns)
+    """Apply the dwell of the samples inside a fixation, each on the AOI that was at its filtered position then."""
+    at = areas.at
+    dwells = [Dwell(area_at(at(t_ns), x, y), t_ns, duration_ns) for t_ns, x, y, duration_ns in output.dwells]
+    return _apply(dwells, attention, account, prepared, gap_ns=prepared.rule.gap_ns)
+
+
+def oldest_waiting_ns(stream: GazeStream) -> int | None:
+    """Return the time of the oldest sample that is not tested against areas yet, ns; None before the first sample.
+
+    Samples wait in the median filter, and as candidates of a fixation. Without any, it is the last sample's time.
+    """
+    filter, candidate = stream.detector.filter, stream.detector.candidate
+    waiting = [filter.points[-filter.waiting][0]] if filter.waiting else []
+    return min([*waiting, *(point[0] for point in candidate[:1])], default=stream.last_ns)
+
+
+def oldest_needed_ns(stream: GazeStream) -> int | None:
+    """Return the earliest time at which areas are still needed, ns: also those of the fixation that goes on."""
+    oldest, open_ = oldest_waiting_ns(stream), stream.detector.open
+    return oldest if open_ is None or oldest is None else min(oldest, open_.start_ns)
 
 
 def apply_names(

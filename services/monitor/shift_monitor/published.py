@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from shift_model.capacity import capacity_class
 from shift_schemas.core_protocol import Step
 from shift_schemas.messages import (
+    AoiPositions,
+    Aois,
     CapacityView,
     Clock,
     Fact,
@@ -17,6 +19,7 @@ from shift_schemas.messages import (
     GazeOutcome,
     GazeView,
     Observation,
+    PlacedAoi,
     Seen,
 )
 from shift_schemas.timestamps import NS, Stamp
@@ -29,12 +32,20 @@ from shift_monitor.clock_ledger import ClockLedger, clock_fact
 from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_account import EMPTY_ACCOUNT, shares
 from shift_monitor.gaze_columns import recorded_columns
+from shift_monitor.moving_areas import AreasOverTime
 from shift_monitor.prepared_study import name_of, prepare_study
 from shift_monitor.recent_samples import valid_share
 from shift_monitor.state import MonitorState, Shown
 
-SourcedFixation = tuple[str, int, EndedFixation]
-"""A fixation that ended, with its source and segment."""
+
+class SourcedFixation(NamedTuple):
+    """A fixation that ended."""
+
+    source: str
+    segment: int
+    fixation: EndedFixation
+    areas: AreasOverTime
+    """The areas of its source."""
 
 
 SHOW_AFTER_NS = 250_000_000
@@ -112,13 +123,25 @@ def gaze_fact(state: MonitorState, chunk: GazeChunk, now: Stamp, outcome: GazeOu
 
 
 def fixation_fact(state: MonitorState, ended: SourcedFixation, now: Stamp) -> Fixation:
-    """Return the record of a fixation that ended."""
-    source, segment, (start_ns, end_ns, x, y) = ended
+    """Return the record of a fixation that ended. Its AOIs are those at its mean position in the middle of its time."""
+    source, segment, (start_ns, end_ns, x, y), over_time = ended
     prepared = prepare_study(state.study)
+    areas = over_time.at((start_ns + end_ns) // 2)
     return Fixation(
         session=state.session, stamp=now, seen=_seen(state), source=source, segment=segment, start_s=start_ns / NS,
-        duration_s=(end_ns - start_ns) / NS, x=x, y=y, aoi=name_of(prepared, area_at(prepared.areas, x, y)),
-        aois=[prepared.names[i] for i in areas_at(prepared.areas, x, y)] if state.format >= 6 else None,
+        duration_s=(end_ns - start_ns) / NS, x=x, y=y, aoi=name_of(prepared, area_at(areas, x, y)),
+        aois=[prepared.names[i] for i in areas_at(areas, x, y)] if state.format >= 6 else None,
+    )  # fmt: skip
+
+
+def aois_fact(
+    state: MonitorState, positions: AoiPositions, content: list[PlacedAoi], segment: int, outcome: GazeOutcome,
+    warnings: tuple[str, ...], now: Stamp,
+) -> Aois:  # fmt: skip
+    """Return the record of areas that moved."""
+    return Aois(
+        session=state.session, stamp=now, seen=_seen(state), source=positions.source, seq=positions.seq,
+        segment=segment, outcome=outcome, t=positions.t, aois=content, warnings=list(warnings),
     )  # fmt: skip
 
 

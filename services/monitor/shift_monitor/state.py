@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 from shift_model.vocabulary import GazeClass
 from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Unavailable
-from shift_schemas.messages import GazeChunk, Session
+from shift_schemas.messages import AoiPositions, GazeChunk, Session
 from shift_schemas.timestamps import Stamp
 
 from shift_monitor.attention import Attention
@@ -18,10 +18,14 @@ from shift_monitor.awareness import History
 from shift_monitor.capacity import Capacity
 from shift_monitor.clock_ledger import EMPTY_LEDGER, ClockLedger
 from shift_monitor.gaze_stream import GazeStream
+from shift_monitor.moving_areas import AreasOverTime, AreaTrack
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 
 CONFIG_WAIT_S = 0.2
 """How long a message waits for the session's configuration, s (docs/design.md)."""
+
+MOST_SOURCES = 256
+"""Chosen: the most gaze sources of one session; each is remembered, so that a former one can be refused."""
 
 UNSET_CAPACITY, UNSET_ATTENTION = Capacity(0.0), Attention(())
 """The values before the first configuration, which sets the start values."""
@@ -69,6 +73,8 @@ class MonitorState:
     """What the last observation showed of gaze; None before the first one."""
     held: bool = False
     """Whether gaze was applied that no observation shows yet."""
+    tracks: dict[str, AreaTrack] = field(default_factory=dict)
+    """The moving areas of each source that sends any."""
     ledgers: dict[str, ClockLedger] = field(default_factory=dict)
     """The ledger of each source; a session before format 5 keeps none."""
 
@@ -95,6 +101,12 @@ def with_ledger(
     return {**state.ledgers, source: change(state.ledgers.get(source, EMPTY_LEDGER))}
 
 
+def areas_over_time(state: MonitorState, source: str, prepared: PreparedStudy) -> AreasOverTime:
+    """Return the areas that gaze of a source is tested against."""
+    track = state.tracks.get(source)
+    return AreasOverTime(prepared.areas) if track is None else track.areas
+
+
 def dump(state: MonitorState) -> str:
     """Return the state as JSON; floats keep every digit."""
     return _STATE.dump_json(state).decode()
@@ -116,6 +128,14 @@ def may_be_used(state: MonitorState | None, chunk: GazeChunk) -> bool:
     if stream is None or stream.source != chunk.source:
         return chunk.source in state.former
     return stream.segment > 0 or chunk.seq <= stream.numbering.last
+
+
+def may_be_moved_again(state: MonitorState | None, positions: AoiPositions) -> bool:
+    """Return whether a message of moving areas may be recorded under its number already."""
+    track = state.tracks.get(positions.source) if state is not None else None
+    if track is None:
+        return False
+    return track.segment > 0 or (track.numbering is not None and positions.seq <= track.numbering.last)
 
 
 def study_in_force(state: MonitorState, timed_out: bool) -> PreparedStudy:

@@ -17,9 +17,9 @@ from shift_runtime.clock import Clock
 from shift_runtime.mesh_api import READ_WAIT_S, MeshApi, new_id
 from shift_runtime.metrics import Metrics
 from shift_schemas.errors import FieldError, MalformedMessage, ShiftError, Unavailable, UnknownThing
-from shift_schemas.messages import Decision, Fact
+from shift_schemas.messages import AoiPositions, Decision, Fact
 from shift_schemas.requests import MarkerBody, StartBody
-from shift_sources.gaze_batching import GazeArrival
+from shift_sources.gaze_batching import MOST_SOURCES, GazeArrival
 from shift_sources.gaze_forwarder import Batching, GazeForwarder
 
 from shift_ros2 import mapping
@@ -53,6 +53,10 @@ class Bridge:
         self._next_task = (self.session, settings.task)
         self._forwarders: OrderedDict[str, GazeForwarder] = OrderedDict()
         self._commands = CommandQueue(self.on_lost)
+        self._aois = CommandQueue(self.on_lost)
+        """AOIs that moved; they do not wait for reports."""
+        self._last_aois: dict[str, AoiPositions] = {}
+        """By gaze source, the last message."""
         self._persons = Persons()
         self._attached: set[str] = set()
         self._published_early: set[str] = set()
@@ -63,6 +67,7 @@ class Bridge:
         """Bind to the session, send commands and publish diagnostics, until cancelled."""
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(self._commands.run())
+            tasks.create_task(self._aois.run())
             tasks.create_task(self._bind())
             tasks.create_task(self._publish_diagnostics())
 
@@ -71,7 +76,8 @@ class Bridge:
         until = asyncio.get_running_loop().time() + wait_s
         for forwarder in list(self._forwarders.values()):
             await forwarder.flush(max(0.0, until - asyncio.get_running_loop().time()))
-        await self._commands.flush(max(0.0, until - asyncio.get_running_loop().time()))
+        for queue in (self._aois, self._commands):
+            await queue.flush(max(0.0, until - asyncio.get_running_loop().time()))
         for forwarder in self._forwarders.values():
             forwarder.close()
 
@@ -83,6 +89,8 @@ class Bridge:
         match topic:
             case "gaze":
                 self._forward_gaze(mapping.gaze_of(text, self.settings.source, self.clock.now().ns / 1e9))
+            case "aois":
+                self._move_aois(mapping.aois_of(text, self.settings.source, self.clock.now().ns / 1e9))
             case "task":
                 message = mapping.task_of(text)
                 self._next_task = (message.session or self.session, message.task)
@@ -130,6 +138,22 @@ class Bridge:
         self._forwarders.move_to_end(session)
         forwarder.put(arrival)
 
+    def _move_aois(self, message: mapping.AoisMessage) -> None:
+        """Send AOIs that moved. Two of one millisecond get numbers that rise."""
+        positions = message.positions
+        last = self._last_aois.pop(positions.source, None)
+        if last is not None and last.seq >= positions.seq and last.t < positions.t:
+            positions = positions.model_copy(update={"seq": last.seq + 1})
+        self._last_aois[positions.source] = positions
+        if len(self._last_aois) > MOST_SOURCES:
+            del self._last_aois[next(iter(self._last_aois))]
+        session = message.session or self.session
+        self._aois.put("aois", partial(self._send_aois, session, positions))
+
+    async def _send_aois(self, session: str, positions: AoiPositions) -> None:
+        await self._attach(session)
+        await self.mesh.aois(session, positions)
+
     def _new_forwarder(self, session: str) -> GazeForwarder:
         if len(self._forwarders) >= SESSIONS:
             idle = next((of for of, forwarder in self._forwarders.items() if forwarder.idle), None)
@@ -153,7 +177,8 @@ class Bridge:
         await self._attach(session)
         if (forwarder := self._forwarders.get(session)) is not None and not forwarder.idle:
             await forwarder.flush(GAZE_WAIT_S)
-        await self._commands.flush(READ_WAIT_S)
+        for queue in (self._aois, self._commands):
+            await queue.flush(READ_WAIT_S)
         answer, repeat = await self.mesh.decide(session, task, request_id)
         text = mapping.text_of_answer(answer)
         if not repeat:

@@ -9,7 +9,8 @@ from shift_ros2.rmw_zenoh import STRING, TRIGGER, RosType
 
 Direction = Literal["in", "out", "service"]
 Topic = Literal[
-    "gaze", "task_performance", "task", "next_strategy", "observation", "estimate", "decision", "say", "diagnostics"
+    "gaze", "aois", "task_performance", "task", "next_strategy", "observation", "estimate", "decision", "say",
+    "diagnostics",
 ]  # fmt: skip
 
 
@@ -30,6 +31,7 @@ class Interface:
 
 INTERFACES: tuple[Interface, ...] = (
     Interface("gaze", "in", stream=True),
+    Interface("aois", "in", stream=True),
     Interface("task_performance", "in"),
     Interface("task", "in"),
     Interface("next_strategy", "service", TRIGGER),

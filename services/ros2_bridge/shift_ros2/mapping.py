@@ -7,7 +7,7 @@ where a chunk has lists. Errors are :class:`MalformedMessage` with field, value 
 from __future__ import annotations
 
 import json
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 from pydantic_core import to_json
@@ -22,7 +22,7 @@ from shift_schemas.errors import (
     shorten,
 )
 from shift_schemas.ids import Id
-from shift_schemas.messages import Fact, GazeChunk, Message, Observation
+from shift_schemas.messages import AoiPositions, Fact, GazeChunk, Message, Observation
 from shift_schemas.requests import PerformanceBody
 from shift_schemas.strict_json import parse_json
 from shift_sources.gaze_batching import COLUMNS, GazeArrival
@@ -79,6 +79,37 @@ def gaze_of(text: str, source: str, now_s: float) -> GazeArrival:
     except ValidationError as e:
         raise _as_sample(malformed("gaze", e)) if sample else malformed("gaze", e) from e
     return GazeArrival(session, chunk, numbered)
+
+
+class AoisMessage(NamedTuple):
+    """AOIs that moved, for a session."""
+
+    session: str | None
+    positions: AoiPositions
+
+
+def aois_of(text: str, source: str, now_s: float) -> AoisMessage:
+    """Return AOIs that moved.
+
+    Parameters
+    ----------
+    source
+        The gaze source if the message names none.
+    now_s
+        The time of the bridge's clock, s. A message without ``t`` holds from then on, and one without ``seq`` gets the
+        number of the millisecond: so the numbers rise, also after a restart of the bridge.
+    """
+    data = _object("aois", text)
+    session = data.pop("session", None)
+    if session is not None:
+        _checked_id("session", session)
+    found = {"source": source, "seq": round(now_s * 1000), "t": now_s} | {
+        k: v for k, v in data.items() if v is not None
+    }
+    try:
+        return AoisMessage(session, AoiPositions.model_validate(found))
+    except ValidationError as e:
+        raise malformed("aois", e) from e
 
 
 def task_of(text: str) -> TaskMessage:

@@ -12,7 +12,16 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from shift_schemas.errors import Unavailable, UnknownThing, malformed
 from shift_schemas.lifecycle import has_ended
-from shift_schemas.messages import Answer, Command, Decide, GazeChunk, Mark, ReportPerformance, StartSession
+from shift_schemas.messages import (
+    Answer,
+    AoiPositions,
+    Command,
+    Decide,
+    GazeChunk,
+    Mark,
+    ReportPerformance,
+    StartSession,
+)
 from shift_schemas.requests import PerformanceBody, body_type
 
 from shift_runtime.mesh_client import MeshClient
@@ -82,8 +91,15 @@ class MeshApi:
     async def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Send gaze to the monitor; it answers once the chunk is in its journal."""
         await self.read_model.view(session)
-        answer = await self.mesh.gaze(session, chunk)
+        answer = await self.mesh.send(session, chunk)
         self._remember(session, answer, {"observation": answer.result["observation"]})
+        return {name: answer.result[name] for name in ("accepted", "warnings") if name in answer.result}
+
+    async def aois(self, session: str, positions: AoiPositions) -> dict[str, Any]:
+        """Send AOIs that moved to the monitor; it answers once they are in its journal."""
+        await self.read_model.view(session)
+        answer = await self.mesh.send(session, positions)
+        self._remember(session, answer, {})
         return {name: answer.result[name] for name in ("accepted", "warnings") if name in answer.result}
 
     async def decide(self, session: str, task: str, decision_id: str | None = None) -> tuple[dict[str, Any], bool]:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from shift_schemas.codec import M, decode, encode
 from shift_schemas.errors import MalformedMessage, Problem, Unavailable, UnknownThing
 from shift_schemas.keys import EVERY_REPLAY, CommandKey, ReplayKey, ServiceKey, StreamKey, build_key
-from shift_schemas.messages import Answer, Command, GazeChunk, Health, ReplayControl, ReplayStatus
+from shift_schemas.messages import Answer, Command, Health, ReplayControl, ReplayStatus, StreamItem
 from shift_schemas.registry import OWNERS
 from shift_schemas.shards import Shard, shard_of
 
@@ -61,10 +61,10 @@ class MeshClient:
         """Return the bus of the session's shard."""
         return self.buses[shard_of(session, len(self.buses))]
 
-    async def gaze(self, session: str, chunk: GazeChunk) -> Answer:
-        """Send a chunk to the monitor; it answers once the chunk is committed."""
-        key = build_key(StreamKey(session, chunk.stream))
-        return await self._ask(session, key, encode(chunk), chunk.owner, 0.0)
+    async def send(self, session: str, item: StreamItem) -> Answer:
+        """Send an item of a stream, such as a chunk of gaze; its service answers once the item is committed."""
+        key = build_key(StreamKey(session, item.stream))
+        return await self._ask(session, key, encode(item), item.owner, 0.0)
 
     async def healths(self, timeout_s: float = 1.0) -> dict[str, Health | None]:
         """Return the health of each owner's worker, None for one that does not answer.

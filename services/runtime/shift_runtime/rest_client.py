@@ -31,7 +31,7 @@ from shift_schemas.errors import (
     check_id,
     shorten,
 )
-from shift_schemas.messages import Command, Decide, EndSession, GazeChunk, ReportPerformance
+from shift_schemas.messages import AoiPositions, Command, Decide, EndSession, GazeChunk, ReportPerformance
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_exponential
 
 from shift_runtime.endpoints import check_url
@@ -101,6 +101,11 @@ class RestClient:
     def gaze(self, session: str, chunk: GazeChunk) -> dict[str, Any]:
         """Send a chunk of gaze."""
         return self._ask("POST", _path(session, "/gaze"), chunk.model_dump(mode="json", exclude_none=True))
+
+    def aois(self, session: str, positions: AoiPositions) -> dict[str, Any]:
+        """Send AOIs that moved."""
+        body = positions.model_dump(mode="json", exclude_none=True, exclude_unset=True)
+        return self._ask("POST", _path(session, "/aois"), body)
 
     def decide(self, session: str, task: str, decision_id: str | None = None) -> dict[str, Any]:
         """Return the strategy to use now, and why."""

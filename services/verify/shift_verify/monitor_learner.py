@@ -13,12 +13,14 @@ from typing import Any, NoReturn
 
 from shift_learner import core as learner
 from shift_monitor import core as monitor
+from shift_monitor.area_step import PositionsWithHistory, RecordedPositions, positions_of
 from shift_monitor.clock_ledger import EMPTY_LEDGER
 from shift_monitor.gaze_input import ChunkWithHistory, RecordedChunk
 from shift_schemas.core_protocol import Step
 from shift_schemas.errors import ShiftError
 from shift_schemas.lifecycle import accepts_input
 from shift_schemas.messages import (
+    Aois,
     Clock,
     Fact,
     Fixation,
@@ -49,6 +51,7 @@ class MonitorFold(OutputFold):
     def __init__(self, inputs: Inputs, on_step: OnStep = ignore_step) -> None:
         super().__init__(inputs, on_step)
         self._numbers: dict[tuple[str, int], tuple[int, ...]] = {}
+        self._position_numbers: dict[tuple[str, int], tuple[int, ...]] = {}
         """By source and chunk number: the segments in which the number was used."""
         self._last: FactAtPlace | None = None
         self._before_show: monitor.MonitorState | None = None
@@ -68,6 +71,8 @@ class MonitorFold(OutputFold):
             if isinstance(placed.fact, Gaze):
                 self._gaze = self._gaze_input(placed.fact)
                 self._length = self._length_without_observation(placed.fact, self._gaze)
+            elif isinstance(placed.fact, Aois):
+                self._length = 1
         super().take(placed)
 
     def ends_group(self, placed: FactAtPlace) -> bool:
@@ -96,6 +101,8 @@ class MonitorFold(OutputFold):
         first, last = group[0].fact, group[-1]
         if isinstance(first, Gaze):
             return self._gaze
+        if isinstance(first, Aois):
+            return self._positions_input(first)
         seen = last.fact.seen
         for subject in ("config", "decision", "performance"):
             before: int = getattr(self.state, subject)
@@ -131,6 +138,12 @@ class MonitorFold(OutputFold):
         used = self._numbers.setdefault((fact.source, fact.seq), ())
         self._numbers[fact.source, fact.seq] = (*used, fact.segment)
         return ChunkWithHistory(monitor.gaze_chunk_of(fact), tuple(RecordedChunk(segment) for segment in used))
+
+    def _positions_input(self, fact: Aois) -> PositionsWithHistory:
+        """Return moving AOIs with the segments in which their number was used before."""
+        used = self._position_numbers.setdefault((fact.source, fact.seq), ())
+        self._position_numbers[fact.source, fact.seq] = (*used, fact.segment)
+        return PositionsWithHistory(positions_of(fact), tuple(RecordedPositions(segment) for segment in used))
 
     def remaining(self) -> Iterator[Fact]:
         """Yield the inputs that have not been applied."""
