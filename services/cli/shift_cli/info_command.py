@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -74,21 +74,27 @@ def _counts(found: RecordingInfo) -> Table:
 
 
 def _clocks(found: RecordingInfo) -> Table:
+    """Return the ledgers, one column for each source."""
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(
-        "gaze source", "chunks", "late", "missing", "repeated", "refused", "restarts", "rate", "longest gap", "drift",
-        "steps of the clock", "round trip",
-    )  # fmt: skip
-    for clock in found.clocks:
-        refused = ", ".join(f"{n} {kind}" for kind, n in clock["refused"].items()) or "0"
-        rate = "-" if clock["rate_hz"] is None else f"{clock['rate_hz']:.4g} Hz"
-        drift = "-" if clock["drift_ppm"] is None else f"{clock['drift_ppm']:+.0f} ppm"
-        counts = [str(clock[name]) for name in ("chunks", "late", "missing", "repeated")]
-        steps = ", ".join(f"{s['step_s']:+.3f} s" for s in (clock["segments"] or ())[1:]) or "-"
-        trip = "-" if clock["round_trip_s"] is None else f"{1000 * clock['round_trip_s']:.1f} ms"
-        gap = f"{clock['longest_gap_s']:.3g} s"
-        row = (*counts, refused, str(clock["restarts"]), rate, gap, drift, steps, trip)
-        table.add_row(escape(clock["source"]), *row)
+    table = Table("gaze source", *(escape(clock["source"]) for clock in found.clocks))
+    described = [_about_clock(clock) for clock in found.clocks]
+    for name in described[0]:
+        table.add_row(name, *(about[name] for about in described))
     return table
+
+
+def _about_clock(clock: dict[str, Any]) -> dict[str, str]:
+    steps = [f"{segment['step_s']:+.3f} s" for segment in (clock["segments"] or ())[1:]]
+    return {
+        **{name: str(clock[name]) for name in ("chunks", "samples", "late", "missing", "repeated")},
+        "refused": ", ".join(f"{n} {kind}" for kind, n in clock["refused"].items()) or "0",
+        "rate": "-" if clock["rate_hz"] is None else f"{clock['rate_hz']:.4g} Hz",
+        "longest gap": f"{clock['longest_gap_s']:.3g} s",
+        "restarts and jumps": str(clock["restarts"]),
+        "the clock was set by": ", ".join(steps) or "-",
+        "offset to the mesh": "-" if clock["offset_s"] is None else f"{clock['offset_s']:.3f} s",
+        "drift": "-" if clock["drift_ppm"] is None else f"{clock['drift_ppm']:+.0f} ppm",
+        "round trip": "-" if clock["round_trip_s"] is None else f"{1000 * clock['round_trip_s']:.1f} ms",
+    }

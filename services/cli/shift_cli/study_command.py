@@ -1,4 +1,4 @@
-"""``shift-mesh study``: check a study file, show a study, list the studies, plan a study. It needs no mesh."""
+"""``shift-mesh study``: check, show, list and plan studies, and take over AOIs of Tobii. It needs no mesh."""
 
 from __future__ import annotations
 
@@ -106,6 +106,37 @@ def list_(data: Data = Path("data"), as_json: Json = False) -> None:
             for sentence in (*found.mistakes, *found.warnings):
                 typer.echo(f"{found.name}: {sentence}")
     raise typer.Exit(1 if any(found.mistakes for found in studies) else 0)
+
+
+@app.command()
+def aois(
+    file: Annotated[
+        Path,
+        typer.Argument(help="The AOI file (JSON).", exists=True, dir_okay=False, readable=True, envvar="SHIFT_FILE"),
+    ],
+    as_json: Json = False,
+) -> None:
+    """Print the AOIs of a Tobii Pro Lab project as the part aois of a study file; notes go to standard error.
+
+    \b
+    shift-mesh study aois scene.aois >> data/studies/mine.yaml
+    shift-mesh study aois scene.aois --json
+    """
+    from shift_schemas.errors import MalformedMessage
+    from shift_study.tobii_aois import tobii_aois
+    from shift_study.yaml_writer import write_yaml
+
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise MalformedMessage(f"{file.name} is not text in UTF-8; export the AOIs as JSON") from None
+    found = tobii_aois(text, file.name)
+    for note in found.notes:
+        typer.echo(f"note: {note}", err=True)
+    if as_json:
+        _print_json({"aois": found.aois, "notes": found.notes})
+    else:
+        typer.echo(write_yaml({"aois": found.aois}), nl=False)
 
 
 @app.command()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from playwright.sync_api import expect
 from shift_runtime.rest_client import RestClient
-from shift_schemas.messages import GazeChunk
+from shift_schemas.messages import AoiPositions, GazeChunk
 from support.browser import Tab
 
 SCRIPT_TEXT = "<img src=x onerror=document.title='interpreted'>"
@@ -90,3 +91,17 @@ def test_room_view_has_no_serious_finding_of_axe(open_tab, shift: RestClient, da
         tab.go(f"/session/{name}")
         tab.wait_text("decision-number", "1")
         assert tab.serious_findings() == []
+
+
+def test_areas_that_move_are_drawn_where_they_are(tab: Tab, shift: RestClient) -> None:
+    study = {"study": "moving", "aois": [{"name": "cup", "rectangle": [0.1, 0.1, 0.2, 0.2]}]}
+    shift.start("P01", session="moving1", study=study)
+    tab.go("/session/moving1")
+    cup = tab.page.locator("[data-aoi=cup]")
+    expect(cup).to_have_attribute("points", "10.00,6.00 20.00,6.00 20.00,12.00 10.00,12.00")
+    for seq, aoi in enumerate(({"rectangle": [0.5, 0.5, 0.75, 1.0]}, {"visible": False})):
+        positions = {"source": "tx", "seq": seq, "t": seq, "aois": [{"name": "cup", **aoi}]}
+        shift.aois("moving1", AoiPositions.model_validate(positions))
+        if seq == 0:
+            expect(cup).to_have_attribute("points", "50,30 75,30 75,60 50,60")
+    expect(cup).to_be_hidden()

@@ -9,6 +9,8 @@ from typing import Any
 from nicegui import ui
 from shift_schemas.messages import Decision
 
+from shift_gateway.web.clock_rows import HEADINGS as CLOCKS
+from shift_gateway.web.clock_rows import clock_rows
 from shift_gateway.web.data_table import DataTable
 from shift_gateway.web.desk_charts import probability_options, probability_update, reward_options, reward_update
 from shift_gateway.web.desk_view import (
@@ -136,6 +138,9 @@ class DeskElements:
         with panel("Cumulative reward") as heading:
             explain(heading, "The sum of the rewards after each report; the number is at the top of the page.")
             self._reward_chart = ui.echart(reward_options())
+        with panel("Clocks of the gaze sources", wide=True, anchor="clocks") as heading:
+            explain(heading, "What came of each source and what did not, and how its clock runs; every ten seconds.")
+            self._clocks = DataTable("clocks", "Clocks of the gaze sources", CLOCKS)
 
     # --- what changes ---
 
@@ -147,6 +152,7 @@ class DeskElements:
             self._numbers = numbers
             self._show_numbers(numbers)
         person = self._awareness.script(awareness_rows(history.observation(at_ns)))
+        person += self._clocks.script(clock_rows(history.ledgers(at_ns)))
         key = (self.selected, *facts_so_far(history, at_ns))
         if key == self._key:
             return person

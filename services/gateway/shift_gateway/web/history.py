@@ -7,11 +7,14 @@ entry at the time under its cursor.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Generic, NamedTuple, TypeVar
 
 from shift_schemas.messages import (
+    Aois,
+    Clock,
     Config,
     Decision,
     Estimate,
@@ -21,6 +24,7 @@ from shift_schemas.messages import (
     Observation,
     Override,
     Performance,
+    PlacedAoi,
     Policy,
     Session,
     Transition,
@@ -98,6 +102,13 @@ class GazeSummary(NamedTuple):
     late: bool
 
 
+class Places(NamedTuple):
+    """Where the AOIs that a gaze source moved are: the last place of each."""
+
+    source: str
+    aois: dict[str, PlacedAoi]
+
+
 class ObservationPoint(NamedTuple):
     """One observation: what charts need of it, and its JSON for everything else."""
 
@@ -125,6 +136,8 @@ class SessionHistory:
     estimates: Series[Estimate] = field(default_factory=Series)
     overrides: Series[Override] = field(default_factory=Series)
     markers: Series[Marker] = field(default_factory=Series)
+    places: Series[Places] = field(default_factory=Series)
+    clocks: Series[Clock] = field(default_factory=Series)
     revision: int = 0
     """Counts the facts; a view is computed again only if it changed."""
 
@@ -153,6 +166,11 @@ class SessionHistory:
                 self.policies.append(ns, fact)
             case Estimate():
                 self.estimates.append(ns, fact)
+            case Aois() if fact.outcome == "applied":
+                self.places.append(ns, places_after(self.places.items, fact))
+                self._forget(self.places, ns)
+            case Clock():
+                self.clocks.append(ns, fact)
             case Override():
                 self.overrides.append(ns, fact)
             case Marker():
@@ -182,6 +200,10 @@ class SessionHistory:
         point = self.observations.last(ns)
         return None if point is None else _observation(point.payload)
 
+    def ledgers(self, ns: int = END_OF_TIME) -> dict[str, Clock]:
+        """Return the last ledger of each gaze source at a time."""
+        return {clock.source: clock for clock in self.clocks.until(ns)}
+
     def performance_of(self, decision_id: str, ns: int = END_OF_TIME) -> Performance | None:
         """Return the report in force of a decision at a time: the last one, since a correction replaces the first."""
         return next((p for p in reversed(self.performances.until(ns)) if p.decision_id == decision_id), None)
@@ -196,6 +218,17 @@ class SessionHistory:
 @lru_cache(maxsize=64)
 def _observation(payload: str) -> Observation:
     return Observation.model_validate_json(payload)
+
+
+def places_after(before: Sequence[Places], fact: Aois) -> Places:
+    """Return the places after a message; an AOI that it does not name, or does not place, stays where it is."""
+    last = next((places for places in reversed(before) if places.source == fact.source), None)
+    aois = dict(last.aois) if last is not None else {}
+    for aoi in fact.aois:
+        known = aois.get(aoi.name)
+        has_shape = bool(aoi.rectangle or aoi.polygon_x)
+        aois[aoi.name] = known.model_copy(update={"visible": aoi.visible}) if known and not has_shape else aoi
+    return Places(fact.source, aois)
 
 
 def summary_of(fact: Gaze) -> GazeSummary:

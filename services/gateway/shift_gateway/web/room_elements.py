@@ -11,7 +11,7 @@ from shift_study.study import Study
 
 from shift_gateway.web.gaze_quality import SourceQuality
 from shift_gateway.web.layout import explain, testid, text
-from shift_gateway.web.room_view import RoomView
+from shift_gateway.web.room_view import RoomView, corners_of
 
 STIMULUS_PATH = "/page-stimulus"
 """Where the browser finds the images of studies."""
@@ -144,7 +144,8 @@ class GazeSources:
 def stimulus_script(view: RoomView) -> str:
     """Return the JavaScript that draws the gaze points and lights the AOIs that are looked at."""
     points = json.dumps([list(p) for p in view.points])
-    return f"shift.stimulus({points}, {json.dumps(sorted({view.held_aoi, *view.looked_at} - {''}))});"
+    looked_at = json.dumps(sorted({view.held_aoi, *view.looked_at} - {""}))
+    return f"shift.stimulus({points}, {looked_at}, {json.dumps(view.moved)});"
 
 
 def _toggled(name: str, wanted: bool) -> dict[str, str]:
@@ -168,12 +169,9 @@ def _image(study: Study) -> str:
 
 
 def _shape(aoi: Aoi) -> str:
-    if aoi.rectangle is not None:
-        left, top, right, bottom = aoi.rectangle
-        corners = [[left, top], [right, top], [right, bottom], [left, bottom]]
-    else:
-        corners = [list(p) for p in aoi.polygon or []]
+    corners = corners_of(aoi.rectangle or (), aoi.polygon or ())
     points = " ".join(f"{100 * x:.2f},{60 * y:.2f}" for x, y in corners)
     x, y = 100 * min(c[0] for c in corners) + 1.5, 60 * min(c[1] for c in corners) + 6
     name = aoi.name
-    return f'<polygon class="aoi" data-aoi="{name}" points="{points}"/><text x="{x:.2f}" y="{y:.2f}">{name}</text>'
+    label = f'<text data-aoi-name="{name}" x="{x:.2f}" y="{y:.2f}">{name}</text>'
+    return f'<polygon class="aoi" data-aoi="{name}" points="{points}"/>{label}'

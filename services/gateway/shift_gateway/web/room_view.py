@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from shift_schemas.messages import Decision, SessionState, Strategy
 from shift_schemas.timestamps import NS
+from shift_study.study import Study
 
 from shift_gateway.web.gaze_quality import SourceQuality, qualities
-from shift_gateway.web.history import END_OF_TIME, GazeSummary, SessionHistory
+from shift_gateway.web.history import END_OF_TIME, GazeSummary, Places, SessionHistory
 from shift_gateway.web.wording import duration, levels, origin, reasons, spoken
 
 WINDOW_S = 180.0
@@ -47,6 +49,8 @@ class RoomView:
     """Source, x and y of each source's last point, if it is not old."""
     looked_at: tuple[str, ...] = ()
     """The AOIs that sources without points name now."""
+    moved: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    """The corners of each AOI that moved, 0..1; none for one that is not visible."""
     overrides: dict[str, str] = field(default_factory=dict)
     """By task, the override that its next decision follows."""
 
@@ -96,6 +100,7 @@ def room_view(history: SessionHistory, now_ns: int, at_ns: int = END_OF_TIME) ->
         sources=seen,
         points=_points(chunks, now_ns),
         looked_at=_looked_at(chunks, now_ns),
+        moved=_moved(history.places.last(at_ns), study),
         overrides={task: _override(o.strategy) for task, o in history.pending_overrides(at_ns).items()},
     )
 
@@ -126,6 +131,25 @@ def _points(chunks: list[GazeSummary], now_ns: int) -> tuple[tuple[str, float, f
 
 def _looked_at(chunks: list[GazeSummary], now_ns: int) -> tuple[str, ...]:
     return tuple(sorted({c.aoi for c in _last_chunks(chunks, now_ns).values() if c.aoi}))
+
+
+def _moved(places: Places | None, study: Study) -> dict[str, tuple[tuple[float, float], ...]]:
+    if places is None:
+        return {}
+    own = {aoi.name: corners_of(aoi.rectangle or (), aoi.polygon or ()) for aoi in study.aois}
+    found = {}
+    for name, aoi in places.aois.items():
+        corners = corners_of(aoi.rectangle, tuple(zip(aoi.polygon_x, aoi.polygon_y, strict=True)))
+        found[name] = (corners or own.get(name, ())) if aoi.visible else ()
+    return found
+
+
+def corners_of(rectangle: Sequence[float], polygon: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
+    """Return the corners of a rectangle (left, top, right, bottom) or of a polygon; the other one is empty."""
+    if rectangle:
+        left, top, right, bottom = rectangle
+        return (left, top), (right, top), (right, bottom), (left, bottom)
+    return tuple((corner[0], corner[1]) for corner in polygon)
 
 
 def _override(strategy: Strategy) -> str:

@@ -11,6 +11,23 @@
   const strips = {};
   const chartOf = (id) => { const e = getElement(id); return e && e.chart; };
 
+  // Draw an AOI where it was moved to: no corners hide it, and without a place it is where the study has it.
+  const placeAoi = (svg, shape, corners) => {
+    const label = svg.querySelector(`[data-aoi-name="${shape.dataset.aoi}"]`);
+    if (corners === undefined && shape.dataset.own === undefined) return;
+    if (shape.dataset.own === undefined) {
+      shape.dataset.own = shape.getAttribute('points');
+      label.dataset.own = `${label.getAttribute('x')} ${label.getAttribute('y')}`;
+    }
+    const hidden = corners !== undefined && corners.length === 0;
+    for (const element of [shape, label]) element.style.display = hidden ? 'none' : '';
+    if (hidden) return;
+    const [x, y] = corners ? [100 * Math.min(...corners.map((c) => c[0])) + 1.5, 60 * Math.min(...corners.map((c) => c[1])) + 6]
+      : label.dataset.own.split(' ');
+    shape.setAttribute('points', corners ? corners.map(([cx, cy]) => `${100 * cx},${60 * cy}`).join(' ') : shape.dataset.own);
+    label.setAttribute('x', x); label.setAttribute('y', y);
+  };
+
   const themed = (chart, c = colours()) => {
     const options = chart.getOption();
     const axes = (list) => (list || []).map(() => ({
@@ -127,7 +144,7 @@
       Object.assign(s, marks);
       drawStrip(id, nowMs);
     },
-    stimulus(points, aois) {
+    stimulus(points, aois, moved = {}) {
       for (const old of document.querySelectorAll('.stimulus .gaze-point')) old.remove();
       for (const svg of document.querySelectorAll('.stimulus svg')) {
         for (const [, x, y] of points) {
@@ -136,8 +153,10 @@
           dot.setAttribute('cx', 100 * x); dot.setAttribute('cy', 60 * y);
           svg.append(dot);
         }
-        for (const shape of svg.querySelectorAll('[data-aoi]'))
+        for (const shape of svg.querySelectorAll('[data-aoi]')) {
           shape.classList.toggle('looked-at', aois.includes(shape.dataset.aoi));
+          placeAoi(svg, shape, moved[shape.dataset.aoi]);
+        }
       }
     },
     table(id, headings, rows) { later(id, () => document.getElementById(`c${id}`), (table) => fillTable(table, headings, rows)); },
