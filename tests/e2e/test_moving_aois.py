@@ -6,10 +6,8 @@ from pathlib import Path
 
 import httpx
 import pytest
-from shift_monitor.areas import Area
 from shift_monitor.attention import initial_attention
 from shift_monitor.gaze_stream import GazeStream
-from shift_monitor.moving_areas import AreasOverTime, Layout
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 from shift_recording.mcap.reader import facts
 from shift_runtime.rest_client import RestClient
@@ -18,7 +16,9 @@ from shift_schemas.messages import AoiPositions, Aois, Fixation, GazeChunk
 from shift_schemas.timestamps import NS
 from shift_sources.files.formats import read_samples
 from shift_sources.files.samples import Sample, chunks
+from shift_study.area_geometry import Area
 from shift_study.loading import given_study, study_json
+from shift_study.moving_areas import AreasOverTime, Layout
 from shift_verify.verify import verify
 from support import slow_gaze
 from support.whole_mesh import LiveMesh

@@ -7,9 +7,9 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_monitor.areas import NOWHERE
 from shift_monitor.attention import Attention, Dwell, apply_dwell, gaze_class, initial_attention, mark_aoi_seen
 from shift_schemas.timestamps import NS
+from shift_study.area_geometry import NOWHERE
 from shift_study.constants import AttentionSettings
 from support.monitor_sessions import configured_session, fold, last, names, study
 

@@ -8,15 +8,15 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shift_monitor.areas import Area
 from shift_monitor.attention import Attention, initial_attention
 from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_stream import GazeStream, apply_points
-from shift_monitor.moving_areas import AreasOverTime, Layout
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 from shift_schemas.messages import GazeChunk
 from shift_schemas.timestamps import NS
+from shift_study.area_geometry import Area
 from shift_study.loading import study_json
+from shift_study.moving_areas import AreasOverTime, Layout
 from support import slow_gaze
 from support.monitor_sessions import RECORDINGS, recording, study
 

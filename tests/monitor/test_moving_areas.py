@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from shift_monitor import core
 from shift_monitor.area_step import PositionsWithHistory, RecordedPositions, positions_of
-from shift_monitor.areas import Area
 from shift_monitor.core import MonitorState
-from shift_monitor.moving_areas import HIDDEN, MOST_LAYOUTS, AreasOverTime, Layout, forgotten_before, moved, track_of
 from shift_schemas.errors import Conflict, MalformedMessage
 from shift_schemas.messages import AoiPosition, AoiPositions, Aois, Fixation, GazeChunk
 from shift_schemas.timestamps import NS, Stamp
+from shift_study.area_geometry import Area
+from shift_study.moving_areas import HIDDEN, MOST_LAYOUTS, AreasOverTime, Layout, forgotten_before, moved, track_of
 from support.monitor_sessions import configured_session, session
 
 NOW = Stamp.of(1_700_000_000 * NS)
@@ -99,7 +99,7 @@ def test_same_number_is_a_repeat_only_with_the_same_content(again: dict[str, Any
 def test_overtaken_message_is_recorded_and_not_applied() -> None:
     state, facts = run(positions(0, 0.0, left=LEFT), positions(2, 0.2, left=RIGHT), positions(1, 0.1, left=LEFT))
     assert [fact.outcome for fact in facts] == ["applied", "applied", "late"]
-    assert state.tracks["tx"].newest[0] == Area(*RIGHT)
+    assert state.tracks["tx"].track.newest[0] == Area(*RIGHT)
     assert "come after later ones" in facts[-1].warnings[0]
 
 
@@ -170,9 +170,9 @@ def test_state_with_moving_areas_is_restored_exactly_and_stays_small() -> None:
         messages += [positions(n, n / 30, left=place), gaze(n, n / 30, (n + 1) / 30 - 1e-9, 0.5, rate_hz=300)]
     state, _ = run(*messages)
     assert core.load(core.dump(state)) == state
-    assert len(state.tracks["tx"].areas.layouts) < 310
+    assert len(state.tracks["tx"].track.areas.layouts) < 310
     state, _ = run(gaze(300, 10.2, 10.4, 0.1), state=state)
-    assert len(state.tracks["tx"].areas.layouts) <= 1
+    assert len(state.tracks["tx"].track.areas.layouts) <= 1
 
 
 # --- the track ---

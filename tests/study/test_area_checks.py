@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_monitor.areas import area_at, area_of
 from shift_schemas.errors import InvalidStudy
 from shift_study.area_checks import area_mistakes, area_warnings
+from shift_study.area_geometry import area_at, area_of
 from shift_study.areas import Aoi
 from shift_study.constants import FixationSettings
 from shift_study.loading import given_study, parse_study, patched, study_from_json, study_json, study_of

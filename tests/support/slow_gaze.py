@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from shift_model.attention import lowered_focus_shift, next_weights, raised_focus_shift
-from shift_monitor.areas import NOWHERE, Area, area_at
 from shift_monitor.attention import Attention
 from shift_monitor.fixation import (
     LONGEST_CANDIDATE,
@@ -22,12 +21,13 @@ from shift_monitor.fixation import (
 from shift_monitor.gaze_account import LOST, OFF_STIMULUS, ON_STIMULUS, GazeAccount, count_dwell, count_samples
 from shift_monitor.gaze_stream import GazeStream
 from shift_monitor.median import LONGEST_WINDOW, MedianWindow, Point
-from shift_monitor.moving_areas import AreasOverTime
 from shift_monitor.prepared_study import PreparedStudy
 from shift_monitor.recent_samples import count_recent
 from shift_schemas.messages import GazeChunk
 from shift_schemas.timestamps import NS
+from shift_study.area_geometry import NOWHERE, Area, area_at
 from shift_study.constants import AttentionSettings
+from shift_study.moving_areas import AreasOverTime
 
 EMPTY = MedianWindow()
 

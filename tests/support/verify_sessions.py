@@ -30,6 +30,7 @@ from shift_recording.segments import SegmentWriter
 from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.messages import (
     FORMAT,
+    AoiPositions,
     Command,
     Configure,
     Decide,
@@ -75,6 +76,8 @@ class Session:
         self.gaze_s = 0.0
         self.steady = steady
         self.chunks = 0
+        self.moves = 0
+        self.moving = recording_format >= 6 and not steady and "aois" not in (study or {})
         given = {"study": "test", "tasks": ["a", "b"], **(study or {})}
         start = StartSession(
             command_id="start", session="s1", participant="P01", seed=7, study=given, format=recording_format,
@@ -128,6 +131,8 @@ class Session:
 
     def gaze(self, source: str = "tx300") -> None:
         """Publish a chunk of ten points around a random place, some of them lost; steady gaze stays in one place."""
+        if self.moving and self.chunks % 4 == 1:
+            self.move(source)
         x = 0.5 if self.steady else self.rng.random()
         t, xs, valid = [], [], []
         for _ in range(10):
@@ -139,6 +144,14 @@ class Session:
         self.do("monitor", GazeChunk(source=source, seq=self.chunks, t=t, x=points, y=points, valid=valid))
         self.answered = self.answered.model_copy(update={"gaze": {**self.answered.gaze, source: self.chunks}})
         self.chunks += 1 if self.rng.random() > 0.05 else 3  # some are lost on the way
+
+    def move(self, source: str) -> None:
+        """Move the AOI in the middle, or hide it, from the next sample on."""
+        left = 0.3 + 0.02 * (self.moves % 20)
+        aoi = {"name": "middle", "rectangle": [left, 0.1, left + 0.3, 0.9], "visible": self.moves % 5 != 4}
+        given = {"source": source, "seq": self.moves, "t": self.gaze_s + 1 / 60, "aois": [aoi]}
+        self.do("monitor", AoiPositions.model_validate(given))
+        self.moves += 1
 
     def decide(self, n: int, timed_out: bool) -> None:
         """Ask for decision ``n``; with ``timed_out``, do not wait for its inputs."""

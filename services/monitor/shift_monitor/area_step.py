@@ -14,15 +14,13 @@ from shift_schemas.errors import Conflict, FieldError, MalformedMessage, shorten
 from shift_schemas.messages import AoiPosition, AoiPositions, Aois, Fact, GazeOutcome
 from shift_schemas.suggestions import did_you_mean
 from shift_schemas.timestamps import NS, Stamp
+from shift_study.moving_areas import begun_again, moved, placed, position_of, track_of
 
-from shift_monitor.chunk_sequence import ChunkSequence, advance, classify_arrival, sequence_from
+from shift_monitor.chunk_sequence import advance, classify_arrival, sequence_from
 from shift_monitor.gaze_stream import GazeStream, oldest_waiting_ns
-from shift_monitor.moving_areas import AreaTrack, begun_again, moved, placed, position_of, track_of
 from shift_monitor.prepared_study import PreparedStudy
 from shift_monitor.published import aois_fact
-from shift_monitor.state import MOST_SOURCES, MonitorState, study_in_force
-
-UNREAD = ChunkSequence()
+from shift_monitor.state import MOST_SOURCES, AreaStream, MonitorState, study_in_force
 
 
 class RecordedPositions(NamedTuple):
@@ -70,14 +68,14 @@ def step_positions(state: MonitorState, given: PositionsWithHistory, now: Stamp,
     _check_source(state, positions)
     places = _places(positions, prepared)
     t_ns = round(positions.t * NS)
-    track = state.tracks.get(positions.source) or track_of(prepared.areas)
-    track, outcome = _onto(track, given, t_ns)
+    stream = state.tracks.get(positions.source) or AreaStream(track_of(prepared.areas))
+    stream, outcome = _onto(stream, given, t_ns)
     warnings = tuple(_warnings(state, positions, t_ns, outcome))
     if outcome == "applied":
-        numbering = advance(track.numbering or sequence_from(positions.seq), positions.seq)
-        track = moved(track._replace(numbering=numbering), t_ns, places)
-    after = replace(state, tracks={**state.tracks, positions.source: track})
-    fact = aois_fact(after, positions, content, track.segment, outcome, warnings, now)
+        numbering = advance(stream.numbering or sequence_from(positions.seq), positions.seq)
+        stream = stream._replace(track=moved(stream.track, t_ns, places), numbering=numbering)
+    after = replace(state, tracks={**state.tracks, positions.source: stream})
+    fact = aois_fact(after, positions, content, stream.segment, outcome, warnings, now)
     return Step(after, (fact,), _result(after, positions, warnings))
 
 
@@ -105,25 +103,25 @@ def _places(positions: AoiPositions, prepared: PreparedStudy) -> list[tuple[int,
     return [(prepared.names.index(position.name), position) for position in positions.aois]
 
 
-def _onto(track: AreaTrack, given: PositionsWithHistory, t_ns: int) -> tuple[AreaTrack, GazeOutcome]:
-    """Return the track that a message is applied to, and whether it is applied.
+def _onto(stream: AreaStream, given: PositionsWithHistory, t_ns: int) -> tuple[AreaStream, GazeOutcome]:
+    """Return the stream that a message is applied to, and whether it is applied.
 
     The time that goes back begins a segment of the source's clock, and a number that comes again one of the numbering.
     """
-    seq, numbering = given.positions.seq, track.numbering
-    goes_on = track.last_ns is None or t_ns >= track.last_ns
+    seq, numbering, last_ns = given.positions.seq, stream.numbering, stream.track.last_ns
+    goes_on = last_ns is None or t_ns >= last_ns
     if numbering is None:
-        return track, "applied"
-    used = any(earlier.segment == track.segment for earlier in given.earlier)
+        return stream, "applied"
+    used = any(earlier.segment == stream.segment for earlier in given.earlier)
     arrival = classify_arrival(numbering, seq, used, goes_on)
     if arrival == "late":
-        return track, "late"
+        return stream, "late"
     if arrival == "new":
-        return track, "applied"
+        return stream, "applied"
     if not goes_on:
-        track = begun_again(track, track.clock_segment + 1)
+        stream = stream._replace(track=begun_again(stream.track), clock_segment=stream.clock_segment + 1)
     kept = numbering if seq > numbering.last else None
-    return track._replace(segment=track.segment + 1, numbering=kept), "applied"
+    return stream._replace(segment=stream.segment + 1, numbering=kept), "applied"
 
 
 def _warnings(state: MonitorState, positions: AoiPositions, t_ns: int, outcome: GazeOutcome) -> list[str]:

@@ -14,9 +14,8 @@ from shift_model import attention as equations
 from shift_model.attention import lowered_focus_shift, next_weights, raised_focus_shift, uniform_weights
 from shift_model.vocabulary import GazeClass
 from shift_schemas.timestamps import NS
+from shift_study.area_geometry import NOWHERE
 from shift_study.constants import AttentionSettings
-
-from shift_monitor.areas import NOWHERE
 
 
 class Attention(NamedTuple):

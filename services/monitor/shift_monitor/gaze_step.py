@@ -12,6 +12,7 @@ from shift_schemas.core_protocol import Step
 from shift_schemas.errors import Conflict
 from shift_schemas.messages import Fact, GazeChunk
 from shift_schemas.timestamps import NS, Stamp
+from shift_study.moving_areas import begun_again, forgotten_before
 
 from shift_monitor.attention import forget_run
 from shift_monitor.chunk_sequence import (
@@ -45,7 +46,6 @@ from shift_monitor.gaze_warnings import (
     rate_warnings,
     share_warnings,
 )
-from shift_monitor.moving_areas import AreaTrack, begun_again, forgotten_before
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 from shift_monitor.published import (
     SourcedFixation,
@@ -56,7 +56,7 @@ from shift_monitor.published import (
     publish,
     running_clock_facts,
 )
-from shift_monitor.state import MOST_SOURCES, MonitorState, areas_over_time, study_in_force, with_ledger
+from shift_monitor.state import MOST_SOURCES, AreaStream, MonitorState, areas_over_time, study_in_force, with_ledger
 
 LARGEST_COUNT = 2**53
 """The largest count in a message (shift_schemas.messages)."""
@@ -171,21 +171,22 @@ def _begin_segment(state: MonitorState, stream: GazeStream, chunk: GazeChunk, ti
     return Continuation(after, begun, ended, [warning], restarted=True)
 
 
-def _tracks_in(state: MonitorState, source: str, segment: int) -> dict[str, AreaTrack]:
+def _tracks_in(state: MonitorState, source: str, segment: int) -> dict[str, AreaStream]:
     """Return the moving areas where a segment begins. Areas that are on its clock already stay as they are."""
-    track = state.tracks.get(source)
-    if track is None:
+    moving = state.tracks.get(source)
+    if moving is None:
         return state.tracks
-    begun = track._replace(clock_segment=segment) if track.clock_segment >= segment else begun_again(track, segment)
-    return {**state.tracks, source: begun}
+    track = moving.track if moving.clock_segment >= segment else begun_again(moving.track)
+    return {**state.tracks, source: moving._replace(track=track, clock_segment=segment)}
 
 
 def _without_old_areas(state: MonitorState, stream: GazeStream) -> MonitorState:
     """Return the state without the places of moving areas that no later sample is tested against."""
-    track, needed_ns = state.tracks.get(stream.source), oldest_needed_ns(stream)
-    if track is None or needed_ns is None:
+    moving, needed_ns = state.tracks.get(stream.source), oldest_needed_ns(stream)
+    if moving is None or needed_ns is None:
         return state
-    return replace(state, tracks={**state.tracks, stream.source: forgotten_before(track, needed_ns)})
+    kept = moving._replace(track=forgotten_before(moving.track, needed_ns))
+    return replace(state, tracks={**state.tracks, stream.source: kept})
 
 
 def _continue_stream(state: MonitorState, stream: GazeStream, chunk: GazeChunk) -> Continuation:

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 from itertools import repeat
 
 from shift_schemas.messages import GazeChunk
+from shift_study.area_geometry import NOWHERE, area_at
+from shift_study.moving_areas import AreasOverTime
 
-from shift_monitor.areas import NOWHERE, area_at
 from shift_monitor.attention import Attention, Dwell, apply_dwells, mark_aoi_seen
 from shift_monitor.chunk_sequence import ChunkSequence
 from shift_monitor.fixation import Detector, EndedFixation, FixationUpdate, update
@@ -24,7 +25,6 @@ from shift_monitor.gaze_account import (
     count_samples,
 )
 from shift_monitor.gaze_columns import points_of
-from shift_monitor.moving_areas import AreasOverTime
 from shift_monitor.prepared_study import PreparedStudy
 from shift_monitor.recent_samples import NO_SAMPLES, RecentSamples, count_recent
 

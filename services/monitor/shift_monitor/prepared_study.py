@@ -6,10 +6,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from shift_schemas.timestamps import NS
+from shift_study.area_geometry import NOWHERE, Area, area_of
 from shift_study.loading import study_from_json
 from shift_study.study import Study
 
-from shift_monitor.areas import NOWHERE, Area, area_of
 from shift_monitor.fixation import FixationRule, rule_of
 
 

@@ -23,16 +23,16 @@ from shift_schemas.messages import (
     Seen,
 )
 from shift_schemas.timestamps import NS, Stamp
+from shift_study.area_geometry import area_at, areas_at
+from shift_study.moving_areas import AreasOverTime
 
 from shift_monitor import clock_ledger
-from shift_monitor.areas import area_at, areas_at
 from shift_monitor.attention import gaze_class
 from shift_monitor.awareness import awareness_views
 from shift_monitor.clock_ledger import ClockLedger, clock_fact
 from shift_monitor.fixation import EndedFixation
 from shift_monitor.gaze_account import EMPTY_ACCOUNT, shares
 from shift_monitor.gaze_columns import recorded_columns
-from shift_monitor.moving_areas import AreasOverTime
 from shift_monitor.prepared_study import name_of, prepare_study
 from shift_monitor.recent_samples import valid_share
 from shift_monitor.state import MonitorState, Shown

@@ -12,13 +12,14 @@ from shift_schemas.core_protocol import InputsMissing
 from shift_schemas.errors import Unavailable
 from shift_schemas.messages import AoiPositions, GazeChunk, Session
 from shift_schemas.timestamps import Stamp
+from shift_study.moving_areas import AreasOverTime, AreaTrack
 
 from shift_monitor.attention import Attention
 from shift_monitor.awareness import History
 from shift_monitor.capacity import Capacity
+from shift_monitor.chunk_sequence import ChunkSequence
 from shift_monitor.clock_ledger import EMPTY_LEDGER, ClockLedger
 from shift_monitor.gaze_stream import GazeStream
-from shift_monitor.moving_areas import AreasOverTime, AreaTrack
 from shift_monitor.prepared_study import PreparedStudy, prepare_study
 
 CONFIG_WAIT_S = 0.2
@@ -39,6 +40,18 @@ class Shown(NamedTuple):
     source: str
     last_ns: int | None
     """The time of the source's last sample."""
+
+
+class AreaStream(NamedTuple):
+    """The areas that one source moves, and the numbers of its messages."""
+
+    track: AreaTrack
+    numbering: ChunkSequence | None = None
+    """The numbers of this segment; None before its first message."""
+    segment: int = 0
+    """How often the time or the numbering began anew."""
+    clock_segment: int = 0
+    """The segment of the gaze source whose clock the times are on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +86,7 @@ class MonitorState:
     """What the last observation showed of gaze; None before the first one."""
     held: bool = False
     """Whether gaze was applied that no observation shows yet."""
-    tracks: dict[str, AreaTrack] = field(default_factory=dict)
+    tracks: dict[str, AreaStream] = field(default_factory=dict)
     """The moving areas of each source that sends any."""
     ledgers: dict[str, ClockLedger] = field(default_factory=dict)
     """The ledger of each source; a session before format 5 keeps none."""
@@ -104,7 +117,7 @@ def with_ledger(
 def areas_over_time(state: MonitorState, source: str, prepared: PreparedStudy) -> AreasOverTime:
     """Return the areas that gaze of a source is tested against."""
     track = state.tracks.get(source)
-    return AreasOverTime(prepared.areas) if track is None else track.areas
+    return AreasOverTime(prepared.areas) if track is None else track.track.areas
 
 
 def dump(state: MonitorState) -> str:

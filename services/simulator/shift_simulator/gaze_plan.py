@@ -19,11 +19,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from shift_model.vocabulary import GazeClass
-from shift_monitor.areas import NOWHERE
 from shift_monitor.attention import Attention, Dwell, apply_dwell, gaze_class
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.messages import GazeChunk, GazeView
 from shift_schemas.timestamps import NS
+from shift_study.area_geometry import NOWHERE
 from shift_study.study import Study
 
 LEAD_NS = 1_000_000

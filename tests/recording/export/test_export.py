@@ -27,7 +27,7 @@ from shift_verify.verify import verify
 from support.verify_sessions import Session
 
 TABLES = ("sessions", "gaze", "fixations", "observations", "estimates", "decisions", "performances", "transitions",
-          "markers", "overrides", "clocks")  # fmt: skip
+          "markers", "overrides", "clocks", "aois")  # fmt: skip
 SCREEN = Screen(1920, 1080)
 
 
@@ -78,7 +78,7 @@ def test_each_table_has_a_row_for_each_fact(recording: Path, tables: tuple[Path,
     out, done = tables
     assert sorted(path.name for path in done.files) == sorted([*(f"{t}.csv" for t in TABLES), "data-dictionary.csv"])
     for table in TABLES:
-        subject = table.removesuffix("s") if table != "gaze" else "gaze"
+        subject = table if table in ("gaze", "aois") else table.removesuffix("s")
         found = recorded(recording, subject)
         wanted = 1 if table == "sessions" else len(found)
         if table == "gaze":

@@ -61,7 +61,7 @@ def naive(facts: list[Gaze]) -> list[dict[str, Any]]:
                 "stamp_utc": fact.stamp.ns, "session_s": session_s, "t_s": t,
                 "x": fact.x[i] if seen else None, "y": fact.y[i] if seen else None,
                 "valid": fact.valid[i] if points else None, "aoi": None if points else fact.aoi[i],
-                **{name: of_eye(fact, name, i) for name in EYE_COLUMNS},
+                "hit": None, **{name: of_eye(fact, name, i) for name in EYE_COLUMNS},
             })  # fmt: skip
     return rows
 

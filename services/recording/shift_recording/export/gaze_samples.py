@@ -19,6 +19,7 @@ from shift_schemas.messages.monitor import EYE_COLUMNS
 from shift_schemas.timestamps import NS
 
 from shift_recording.export.columns import Column
+from shift_recording.export.hits import HitFinder
 from shift_recording.mcap.reader import RecordedMessage, fact_of
 
 RECORDED = pa.schema([
@@ -63,17 +64,22 @@ class GazeReader:
     ) -> None:
         self._columns, self._schema, self._text_of = tuple(columns), schema, text_of
 
-    def read(self, session: Session | None, messages: Sequence[RecordedMessage]) -> Samples:
-        """Return the samples of messages; behind a message that is not valid, nothing is read."""
+    def read(
+        self, session: Session | None, messages: Sequence[RecordedMessage], hits: HitFinder | None = None
+    ) -> Samples:
+        """Return the samples of messages; behind a message that is not valid, nothing is read.
+
+        ``hits`` finds their AOIs; without it the column ``hit`` is empty.
+        """
         payloads, damage = [message.data for message in messages], None
         chunks = _parsed(payloads)
         if chunks is None:
             payloads, damage = _checked(messages)
             chunks = _parsed(payloads)
             assert chunks is not None, "an encoded fact is one line of JSON"
-        return Samples(self._rows(chunks, session), damage)
+        return Samples(self._rows(chunks, session, hits), damage)
 
-    def _rows(self, chunks: pa.Table, session: Session | None) -> pa.Table:
+    def _rows(self, chunks: pa.Table, session: Session | None, hits: HitFinder | None) -> pa.Table:
         counts = pc.list_value_length(chunks["t"]).to_numpy()
         chunk_of = np.repeat(np.arange(len(counts)), counts)
         stamps = chunks["stamp"].combine_chunks()
@@ -83,10 +89,22 @@ class GazeReader:
         same["stamp_utc"] = times
         found = {name: values.take(pa.array(chunk_of)) for name, values in same.items()}
         found |= _varying(chunks, counts, ns.to_numpy(), session)
+        found["hit"] = _hits_of(chunks, counts, found, hits)
         for name in ("session", "participant", "condition"):
             value = getattr(session, name) if session is not None else None
             found[name] = pa.repeat(pa.scalar(value, pa.string()), len(chunk_of))
         return pa.table([found[c.name] for c in self._columns], schema=self._schema)
+
+
+def _hits_of(chunks: pa.Table, counts: Any, found: dict[str, pa.Array], hits: HitFinder | None) -> pa.Array:
+    """Return the AOI of each sample."""
+    x, y = (pc.fill_null(found[name], 0.0).to_numpy() for name in ("x", "y"))
+    if hits is None or len(x) == 0:
+        return pa.nulls(len(x), pa.string())
+    seen = found["x"].is_valid().to_numpy(zero_copy_only=False)
+    sources, segments = chunks["source"].to_pylist(), chunks["segment"].to_pylist()
+    indices = hits.hits(sources, segments, counts, found["t_s"].to_numpy(), x, y, seen)
+    return pa.array(hits.names, pa.string()).take(pa.array(indices))
 
 
 def _parsed(payloads: list[bytes]) -> pa.Table | None:

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from shift_schemas.errors import DamagedRecording, MalformedMessage, UnknownThing
-from shift_schemas.messages import Gaze, Session
+from shift_schemas.messages import Aois, Config, Fact, Gaze, Session
+from shift_study.loading import study_from_json
 
 from shift_recording.exclusion import read_exclusion
 from shift_recording.export.columns import Names
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from shift_recording.export.gaze_samples import GazeReader
+    from shift_recording.export.hits import HitFinder
 
 OnProgress = Callable[[int, int], None]
 """Called with the number of bytes that were read, and their total."""
@@ -47,12 +49,19 @@ HELD_BYTES = 2**20
 """Gaze is read when so many bytes of it are held: about 20,000 samples."""
 
 
+HELD_MOVES = 500
+"""As many messages of moving AOIs may come before gaze is read; fewer than a track of them keeps."""
+
+
 class OneRecording:
     """The rows of one recording. Read it once."""
 
     def __init__(self, path: Path, report: Report, covariates: Mapping[str, Mapping[str, str]]) -> None:
         self.rows = RecordingRows(path.name)
         self._path, self._report, self._covariates = path, report, covariates
+        self._hits: HitFinder | None = None
+        self._moves = 0
+        """Messages of moving AOIs since gaze was read last."""
 
     def rows_of(self, gaze: GazeReader | None) -> Iterator[tuple[str, Row | pa.Table]]:
         """Yield the rows, each with its table; gaze comes as tables of pyarrow, and not at all without a reader.
@@ -66,7 +75,12 @@ class OneRecording:
             self.rows.session = first_session(self._path)
             for message in recording.messages():
                 if message.topic != Gaze.subject:
-                    yield from self.rows.rows(recorded_fact(self._path, message))
+                    recorded = recorded_fact(self._path, message)
+                    if gaze is not None and self._must_be_read_before(recorded.fact) and held:
+                        reading, held, size = held, [], 0
+                        yield from self._samples(gaze, reading)
+                    self._take(recorded.fact)
+                    yield from self.rows.rows(recorded)
                 elif gaze is not None:
                     held.append(message)
                     size += len(message.data)
@@ -84,8 +98,25 @@ class OneRecording:
         reason = "" if whole else self._report.damaged.get(name, recording.report.reason)
         yield from self.rows.rest(whole, reason, covariates_of(self.rows.session, self._covariates))
 
+    def _must_be_read_before(self, fact: Fact) -> bool:
+        """Return whether the gaze that is held must be read before a fact, which changes where the AOIs were."""
+        if not isinstance(fact, Aois) or self._hits is None:
+            return False
+        return self._moves >= HELD_MOVES or self._hits.begins_anew(fact)
+
+    def _take(self, fact: Fact) -> None:
+        """Take what gaze is tested against."""
+        if isinstance(fact, Config) and self._hits is None:
+            from shift_recording.export.hits import HitFinder
+
+            self._hits = HitFinder(study_from_json(fact.study))
+        elif isinstance(fact, Aois) and self._hits is not None:
+            self._hits.move(fact)
+            self._moves += 1
+
     def _samples(self, gaze: GazeReader, messages: list[RecordedMessage]) -> Iterator[tuple[str, pa.Table]]:
-        samples = gaze.read(self.rows.session, messages)
+        self._moves = 0
+        samples = gaze.read(self.rows.session, messages, self._hits)
         yield "gaze", samples.rows
         if samples.damage is not None:
             raise DamagedRecording(f"{self._path.name}: {samples.damage.detail}")

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from shift_schemas.messages import (
+    Aois,
     Clock,
     Config,
     Decision,
@@ -34,9 +35,10 @@ from shift_recording.export.columns import Column, Names, columns_of, values_of
 from shift_recording.mcap.reader import RecordedFact
 
 TABLES: dict[str, type[Fact]] = {
-    "gaze": Gaze, "fixations": Fixation, "observations": Observation, "estimates": Estimate, "decisions": Decision,
-    "performances": Performance, "transitions": Transition, "markers": Marker, "overrides": Override,
-    "clocks": Clock,
+    "gaze": Gaze, "fixations": Fixation, "observations": Observation, "estimates": Estimate,
+    "decisions": Decision, "performances": Performance, "transitions": Transition, "markers": Marker,
+    "overrides": Override,
+    "clocks": Clock, "aois": Aois,
 }  # fmt: skip
 """The tables with one row for each fact, and its class; ``gaze`` has one row for each sample."""
 TABLE_OF = {kind.subject: name for name, kind in TABLES.items()}
@@ -66,6 +68,13 @@ GAZE = (
     Column("y", "number", "Position, 0..1 from the top; empty for a lost sample and for gaze on AOIs.", "gaze"),
     Column("valid", "boolean", "Whether the sample is valid; empty for gaze on AOIs.", "gaze"),
     Column("aoi", "text", "The AOI that the source named; empty for points and for no AOI.", "gaze"),
+    Column(
+        "hit",
+        "text",
+        "The AOI at the sample's point, of those that held at its time; the first one where they overlap. Empty for no "
+        "AOI, for a lost sample and for gaze on AOIs. The model counts dwell within fixations instead.",
+        "gaze",
+    ),
     *(
         Column(
             f"{what}_{eye}", "number", f"{meaning} of the {eye} eye, in the source's unit; empty where lost.", "gaze"
@@ -73,6 +82,21 @@ GAZE = (
         for what, meaning in (("pupil", "Pupil size"), ("openness", "Openness"))
         for eye in ("left", "right")
     ),
+)
+AOIS = (
+    Column("stamp_utc", "time", "When the monitor applied the message.", "aois"),
+    Column("source", "text", "The gaze source on whose clock the AOI moves.", "aois"),
+    Column("seq", "integer", "Number of the message within its source.", "aois"),
+    Column("segment", "integer", "Counts the restarts of the time or the numbering.", "aois"),
+    Column("outcome", "text", "applied; late: recorded, not applied.", "aois"),
+    Column("t_s", "number", "From when on it holds, on the source's clock.", "aois"),
+    Column("name", "text", "The AOI.", "aois"),
+    Column("visible", "boolean", "Whether gaze can fall on it.", "aois"),
+    Column("left", "number", "Left edge of a rectangle, 0..1; empty without one.", "aois"),
+    Column("top", "number", "Top edge of a rectangle, 0..1; empty without one.", "aois"),
+    Column("right", "number", "Right edge of a rectangle, 0..1; empty without one.", "aois"),
+    Column("bottom", "number", "Bottom edge of a rectangle, 0..1; empty without one.", "aois"),
+    Column("polygon", "text", "The corners of a polygon, x y each; empty without one.", "aois"),
 )
 ABOUT_FILE = (
     Column("file", "text", "The recording.", ""),
@@ -115,7 +139,9 @@ def table_columns(names: Names, covariates: Iterable[str] = ()) -> dict[str, tup
     ]
     found = {"sessions": (*KEYS, *given, *ABOUT_FILE, *about), "gaze": (*KEYS, *GAZE)}
     for table, kind in TABLES.items():
-        if table != "gaze":
+        if table == "aois":
+            found[table] = (*KEYS, SESSION_TIME, *AOIS)
+        elif table != "gaze":
             found[table] = (*KEYS, SESSION_TIME, *columns_of(kind, names, kind.subject))
     partner = [c for c in found["observations"] if _is_partner(c.name)]
     results = [c for c in found["performances"] if c.name in RESULT]
@@ -133,6 +159,19 @@ def table_columns(names: Names, covariates: Iterable[str] = ()) -> dict[str, tup
 def _is_partner(column: str) -> bool:
     """Return whether a decision's row repeats a column of the observation that it saw: capacity, weights and gaze."""
     return column == "capacity_value" or column.removeprefix("weights_") != column or column in GAZE_VIEW
+
+
+def _aoi_rows(fact: Aois) -> Iterator[Row]:
+    """Yield a row for each AOI that a message names."""
+    for aoi in fact.aois:
+        edges: list[float | None] = [*aoi.rectangle] or [None] * 4
+        corners = zip(aoi.polygon_x, aoi.polygon_y, strict=True)
+        yield {
+            "stamp_utc": fact.stamp.ns, "source": fact.source, "seq": fact.seq, "segment": fact.segment,
+            "outcome": fact.outcome, "t_s": fact.t, "name": aoi.name, "visible": aoi.visible,
+            **dict(zip(("left", "top", "right", "bottom"), edges, strict=True)),
+            "polygon": ", ".join(f"{x!r} {y!r}" for x, y in corners) or None,
+        }  # fmt: skip
 
 
 @dataclass
@@ -173,6 +212,10 @@ class RecordingRows:
             return
         if isinstance(fact, Decision):
             self._decisions.append(fact)
+            return
+        if isinstance(fact, Aois):
+            same = {**self.keys(), "session_s": self._session_s(fact.stamp.ns)}
+            yield from ((table, {**same, **row}) for row in _aoi_rows(fact))
             return
         values = values_of(fact)
         if isinstance(fact, Observation):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from shift_monitor.areas import NOWHERE, area_at, area_of
+from shift_study.area_geometry import NOWHERE, area_at, area_of
 from shift_study.areas import Aoi
 from shift_study.study import Study
 

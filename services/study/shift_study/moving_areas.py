@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 from shift_schemas.messages import AoiPosition, PlacedAoi
 
-from shift_monitor.areas import Area
-from shift_monitor.chunk_sequence import ChunkSequence
+from shift_study.area_geometry import Area
 
 HIDDEN = Area(0.0, 0.0, 0.0, 0.0)
 """An area that no point falls on."""
@@ -48,13 +47,8 @@ class AreaTrack(NamedTuple):
     areas: AreasOverTime
     shapes: tuple[Area, ...]
     """The last shape of each area, also of one that is not visible."""
-    numbering: ChunkSequence | None = None
-    """The numbers of this segment; None before its first message."""
-    segment: int = 0
-    """How often the time or the numbering began anew."""
-    clock_segment: int = 0
-    """The segment of the gaze source whose clock the times are on."""
     last_ns: int | None = None
+    """The time of the last message; None where the clock began anew, and before the first message."""
 
     @property
     def newest(self) -> tuple[Area, ...]:
@@ -77,9 +71,9 @@ def moved(track: AreaTrack, t_ns: int, places: Sequence[tuple[int, AoiPosition]]
     return track._replace(areas=_bounded(AreasOverTime(track.areas.first, layouts)), shapes=tuple(shapes), last_ns=t_ns)
 
 
-def begun_again(track: AreaTrack, clock_segment: int) -> AreaTrack:
+def begun_again(track: AreaTrack) -> AreaTrack:
     """Return the track where the source's clock begins anew: the newest areas hold until they are moved."""
-    return track._replace(areas=AreasOverTime(track.newest), last_ns=None, clock_segment=clock_segment)
+    return AreaTrack(AreasOverTime(track.newest), track.shapes)
 
 
 def forgotten_before(track: AreaTrack, t_ns: int) -> AreaTrack:
