@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shift_schemas.errors import InvalidSettings, MalformedMessage
 from shift_sources.files.formats import ABOUT, FORMATS, read_samples
+from shift_sources.files.options import ScreenSize
 from shift_sources.files.samples import Sample
-from shift_sources.files.table import ScreenSize
 
 SCREEN = ScreenSize(2000, 1000)
 

@@ -2,35 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.suggestions import did_you_mean
 
-from shift_sources.files import gazepoint, neon, pupil, titta, tobii_pro_lab, tx300
-from shift_sources.files.samples import Sample
-from shift_sources.files.table import Recogniser, ScreenSize, read_table
+from shift_sources.files import (
+    eyelink,
+    gazepoint,
+    neon,
+    pupil,
+    pupil_cloud_aois,
+    smi,
+    titta,
+    tobii_glasses,
+    tobii_pro_lab,
+    tx300,
+)
+from shift_sources.files.options import Options, ScreenSize
+from shift_sources.files.samples import Gaze, Marker, Sample
+from shift_sources.files.table import Reader
+from shift_sources.files.text_file import TextFile, opened
 
-FORMATS: dict[str, tuple[Recogniser, ...]] = {
+FORMATS: dict[str, tuple[Reader, ...]] = {
     **tx300.FORMATS, **titta.FORMATS, **tobii_pro_lab.FORMATS, **pupil.FORMATS, **neon.FORMATS, **gazepoint.FORMATS,
+    **pupil_cloud_aois.FORMATS, **tobii_glasses.FORMATS, **eyelink.FORMATS, **smi.FORMATS,
 }  # fmt: skip
 """Every format, in the order in which a file's content is compared with them."""
 ABOUT = {
     "tx300": "Tobii TX300: Time, LGazePos2dx, LGazePos2dy, LValidity, RGazePos2dx, RGazePos2dy, RValidity (TSV)",
     "titta": "Titta: device_time_stamp, left_gaze_point_on_display_area_x, ..._y, left_gaze_point_valid, ... (TSV)",
-    "tobii": "Tobii Pro Lab and Studio: Recording timestamp, Gaze point X, Gaze point Y (TSV; --screen for pixels)",
+    "tobii": "Tobii Pro Lab and Studio: Recording timestamp, Gaze point X, Y, AOI hit [...] (TSV; --screen for pixels)",
     "pupil": "Pupil Core gaze_positions.csv: gaze_timestamp, norm_pos_x, norm_pos_y, confidence",
     "pupil-surface": "Pupil Core gaze_positions_on_surface_NAME.csv: gaze_timestamp, x_norm, y_norm, on_surf",
     "neon": "Pupil Labs Neon and Invisible gaze.csv: timestamp [ns], gaze x [px], gaze y [px] (--screen)",
     "neon-surface": "Pupil Labs marker mapper: timestamp [ns], gaze position on surface x [normalized], ...",
-    "gazepoint": "Gazepoint all_gaze.csv: TIME(...), BPOGX, BPOGY, BPOGV or FPOGX, FPOGY, FPOGV",
+    "gazepoint": "Gazepoint all_gaze.csv: TIME(...), BPOGX, BPOGY, BPOGV or FPOGX, FPOGY, FPOGV, AOI",
+    "pupil-cloud-aois": "Pupil Cloud aoi_fixations.csv, with fixations.csv beside it: aoi label, fixation id",
+    "glasses3": 'Tobii Pro Glasses 3 gazedata.gz: {"type":"gaze","timestamp":...,"data":{"gaze2d":...}}, one a line',
+    "glasses2": 'Tobii Pro Glasses 2 livedata.json.gz: {"ts":...,"s":0,"gp":[...]}, one a line',
+    "eyelink": "EyeLink ASC: SAMPLES GAZE, lines of time, x, y, pupil of each eye; MSG become markers",
+    "smi": "SMI IDF converter and BeGaze text: Time, Type, L POR X [px], L POR Y [px], R ...; MSG become markers",
 }
 """What each format is, with the columns by which it is recognised."""
 
 
+class GazeFile(NamedTuple):
+    """A gaze file that was read whole."""
+
+    samples: list[Sample]
+    markers: list[Marker]
+    named: bool
+    """Whether the samples are AOI names and not points."""
+
+
 def read_samples(path: Path, screen: ScreenSize | None = None, format_: str = "") -> Iterator[Sample]:
-    """Yield the samples of a gaze file in order.
+    """Yield the samples of a gaze file in order, without its messages.
 
     Parameters
     ----------
@@ -47,9 +76,42 @@ def read_samples(path: Path, screen: ScreenSize | None = None, format_: str = ""
         The file has none of the formats, or a row is wrong. The message names the file, the line, the value and the
         rule; it is raised when that line is reached.
     """
+    formats = _accepted(format_)
+    with opened(path) as file:
+        for item in _recognised(file, formats, Options(screen=screen)).items:
+            if isinstance(item, Sample):
+                yield item
+
+
+def read_gaze(path: Path, options: Options | None = None, format_: str = "") -> GazeFile:
+    """Return all of a gaze file: samples, messages, and whether it names AOIs. Raise as :func:`read_samples` does."""
+    formats = _accepted(format_)
+    samples: list[Sample] = []
+    markers: list[Marker] = []
+    with opened(path) as file:
+        gaze = _recognised(file, formats, options or Options())
+        for item in gaze.items:
+            if isinstance(item, Sample):
+                samples.append(item)
+            else:
+                markers.append(item)
+    return GazeFile(samples, markers, gaze.named)
+
+
+def _accepted(format_: str) -> Mapping[str, tuple[Reader, ...]]:
     if format_ and format_ not in FORMATS:
         known = ", ".join(FORMATS)
         raise InvalidSettings(
             f"there is no format {format_!r}; there are {known}{did_you_mean(format_, tuple(FORMATS))}"
         )
-    return read_table(path, {format_: FORMATS[format_]} if format_ else FORMATS, screen)
+    return {format_: FORMATS[format_]} if format_ else FORMATS
+
+
+def _recognised(file: TextFile, formats: Mapping[str, tuple[Reader, ...]], options: Options) -> Gaze:
+    """Return the gaze of the first format that fits. Raise :class:`MalformedMessage` if none does."""
+    for readers in formats.values():
+        for reader in readers:
+            if (gaze := reader(file, options)) is not None:
+                return gaze
+    rule = f"the header of one of these tables: {', '.join(formats)}; shift-mesh gaze formats lists their columns"
+    raise file.wrong(1, "header", (file.head or [""])[0].strip(), rule)
