@@ -1,4 +1,4 @@
-"""Text of EyeLink (ASC, made by ``edf2asc``): milliseconds, each eye's position in pixels and pupil size, ``.`` if lost.
+"""Text of EyeLink (ASC, made by ``edf2asc``): milliseconds, each eye's position in pixels, pupil size; ``.`` is lost.
 
 The line ``SAMPLES`` says which eyes follow and that positions are gaze on the screen. The screen's coordinates are in a
 message (``GAZE_COORDS 0.00 0.00 1919.00 1079.00``: 1920 x 1080 pixels) or given with ``--screen``. Lines ``MSG`` are

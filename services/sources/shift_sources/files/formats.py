@@ -12,6 +12,7 @@ from shift_schemas.suggestions import did_you_mean
 from shift_sources.files import (
     eyelink,
     gazepoint,
+    mapped_table,
     neon,
     pupil,
     pupil_cloud_aois,
@@ -29,8 +30,11 @@ from shift_sources.files.text_file import TextFile, opened
 FORMATS: dict[str, tuple[Reader, ...]] = {
     **tx300.FORMATS, **titta.FORMATS, **tobii_pro_lab.FORMATS, **pupil.FORMATS, **neon.FORMATS, **gazepoint.FORMATS,
     **pupil_cloud_aois.FORMATS, **tobii_glasses.FORMATS, **eyelink.FORMATS, **smi.FORMATS,
+    **mapped_table.FORMATS,
 }  # fmt: skip
 """Every format, in the order in which a file's content is compared with them."""
+MAPPED = "columns"
+"""The format of tables whose columns the command line names."""
 ABOUT = {
     "tx300": "Tobii TX300: Time, LGazePos2dx, LGazePos2dy, LValidity, RGazePos2dx, RGazePos2dy, RValidity (TSV)",
     "titta": "Titta: device_time_stamp, left_gaze_point_on_display_area_x, ..._y, left_gaze_point_valid, ... (TSV)",
@@ -45,6 +49,7 @@ ABOUT = {
     "glasses2": 'Tobii Pro Glasses 2 livedata.json.gz: {"ts":...,"s":0,"gp":[...]}, one a line',
     "eyelink": "EyeLink ASC: SAMPLES GAZE, lines of time, x, y, pupil of each eye; MSG become markers",
     "smi": "SMI IDF converter and BeGaze text: Time, Type, L POR X [px], L POR Y [px], R ...; MSG become markers",
+    "columns": "Any other table, such as GazeBase's; --columns says what its columns are",
 }
 """What each format is, with the columns by which it is recognised."""
 
@@ -76,20 +81,22 @@ def read_samples(path: Path, screen: ScreenSize | None = None, format_: str = ""
         The file has none of the formats, or a row is wrong. The message names the file, the line, the value and the
         rule; it is raised when that line is reached.
     """
-    formats = _accepted(format_)
+    options = Options(screen=screen)
+    formats = _accepted(format_, options)
     with opened(path) as file:
-        for item in _recognised(file, formats, Options(screen=screen)).items:
+        for item in _recognised(file, formats, options).items:
             if isinstance(item, Sample):
                 yield item
 
 
 def read_gaze(path: Path, options: Options | None = None, format_: str = "") -> GazeFile:
     """Return all of a gaze file: samples, messages, and whether it names AOIs. Raise as :func:`read_samples` does."""
-    formats = _accepted(format_)
+    options = options or Options()
+    formats = _accepted(format_, options)
     samples: list[Sample] = []
     markers: list[Marker] = []
     with opened(path) as file:
-        gaze = _recognised(file, formats, options or Options())
+        gaze = _recognised(file, formats, options)
         for item in gaze.items:
             if isinstance(item, Sample):
                 samples.append(item)
@@ -98,13 +105,18 @@ def read_gaze(path: Path, options: Options | None = None, format_: str = "") -> 
     return GazeFile(samples, markers, gaze.named)
 
 
-def _accepted(format_: str) -> Mapping[str, tuple[Reader, ...]]:
+def _accepted(format_: str, options: Options) -> Mapping[str, tuple[Reader, ...]]:
     if format_ and format_ not in FORMATS:
         known = ", ".join(FORMATS)
         raise InvalidSettings(
             f"there is no format {format_!r}; there are {known}{did_you_mean(format_, tuple(FORMATS))}"
         )
-    return {format_: FORMATS[format_]} if format_ else FORMATS
+    if options.columns and format_ not in ("", MAPPED):
+        raise InvalidSettings(f"--columns is for tables of no known format: leave --format {format_} or --columns out")
+    if options.columns or format_:
+        name = format_ or MAPPED
+        return {name: FORMATS[name]}
+    return {name: readers for name, readers in FORMATS.items() if name != MAPPED}
 
 
 def _recognised(file: TextFile, formats: Mapping[str, tuple[Reader, ...]], options: Options) -> Gaze:
@@ -113,5 +125,6 @@ def _recognised(file: TextFile, formats: Mapping[str, tuple[Reader, ...]], optio
         for reader in readers:
             if (gaze := reader(file, options)) is not None:
                 return gaze
-    rule = f"the header of one of these tables: {', '.join(formats)}; shift-mesh gaze formats lists their columns"
+    rule = f"the header of one of these tables: {', '.join(formats)}; shift-mesh gaze formats lists their columns; "
+    rule += "any other table is read with --columns"
     raise file.wrong(1, "header", (file.head or [""])[0].strip(), rule)

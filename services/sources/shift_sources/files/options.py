@@ -86,7 +86,7 @@ def origin_of(text: str) -> Origin | None:
     try:
         return Origin(text)
     except ValueError:
-        known = tuple(Origin)
+        known = [origin.value for origin in Origin]
         raise InvalidSettings(f"--origin is {text!r}: write {', '.join(known)}{did_you_mean(text, known)}") from None
 
 

@@ -2,8 +2,8 @@
 
 Remarks before the table (``##``) say the size of the screen (``Calibration Area``); without it, ``--screen`` is needed.
 Nothing else of them is read, such as the subject's name. Rows of type SMP are samples and rows of type MSG messages;
-rows of other types are skipped. An eye that blinks (``L Event Info``) is lost. Pupil sizes are in mm where the table has
-them, else in the eye camera's pixels.
+rows of other types are skipped. An eye that blinks (``L Event Info``) is lost. Pupil sizes are in mm where the table
+has them, else in the eye camera's pixels.
 """
 
 from __future__ import annotations
