@@ -70,6 +70,11 @@ Time\tType\tTrial\tL Dia X [px]\tL Mapped Diameter [mm]\tL POR X [px]\tL POR Y [
 10003000\tUE-keyboard\t1\tSpace
 10004000\tSMP\t1\t0\t0.00\t0.00\t0.00\t0.00\t0.00\t-
 """
+BEGAZE = """RecordingTime [ms],Participant,Category Group,Category Left,Pupil Diameter Left [mm],Point of Regard Right X [px],Point of Regard Right Y [px],Point of Regard Left X [px],Point of Regard Left Y [px],AOI Name Left
+100.5,Ada,Eye,Fixation,3.5,168.0,105.0,840.0,525.0,cup
+104.5,Ada,Information,-,-,-,-,-,-,-
+108.5,Ada,Eye,Blink,0.0,-,-,840.0,525.0,White Space
+"""
 
 
 def read(folder: Path, text: str, encoding: str = "utf-8", **said: Any) -> GazeFile:
@@ -218,3 +223,13 @@ def test_what_is_written_is_read_back(write: Any, samples: Points) -> None:
         assert sample.valid == (point is not None)
         if point is not None:
             assert (sample.x, sample.y) == pytest.approx(point, abs=1e-9)
+
+
+def test_raw_data_of_begaze_are_points_or_names(tmp_path: Path) -> None:
+    found = read(tmp_path, BEGAZE, screen=ScreenSize(1680, 1050))
+    assert found.samples == [near(0, 0.3, 0.3, Eyes(3.5)), near(0.008, None, None)]
+    named = read(tmp_path, BEGAZE, named=True)
+    assert [(s.aoi, s.valid) for s in named.samples] == [("cup", True), (None, False)]
+    with pytest.raises(InvalidSettings, match="--screen 1920x1080"):
+        read(tmp_path, BEGAZE)
+    assert "Ada" not in repr(found)

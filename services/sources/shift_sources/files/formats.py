@@ -10,6 +10,7 @@ from shift_schemas.errors import InvalidSettings
 from shift_schemas.suggestions import did_you_mean
 
 from shift_sources.files import (
+    begaze,
     eyelink,
     gazepoint,
     mapped_table,
@@ -30,6 +31,7 @@ from shift_sources.files.text_file import TextFile, opened
 FORMATS: dict[str, tuple[Reader, ...]] = {
     **tx300.FORMATS, **titta.FORMATS, **tobii_pro_lab.FORMATS, **pupil.FORMATS, **neon.FORMATS, **gazepoint.FORMATS,
     **pupil_cloud_aois.FORMATS, **tobii_glasses.FORMATS, **eyelink.FORMATS, **smi.FORMATS,
+    **begaze.FORMATS,
     **mapped_table.FORMATS,
 }  # fmt: skip
 """Every format, in the order in which a file's content is compared with them."""
@@ -49,6 +51,7 @@ ABOUT = {
     "glasses2": 'Tobii Pro Glasses 2 livedata.json.gz: {"ts":...,"s":0,"gp":[...]}, one a line',
     "eyelink": "EyeLink ASC: SAMPLES GAZE, lines of time, x, y, pupil of each eye; MSG become markers",
     "smi": "SMI IDF converter and BeGaze text: Time, Type, L POR X [px], L POR Y [px], R ...; MSG become markers",
+    "begaze": "SMI BeGaze raw data: RecordingTime [ms], Point of Regard Left X [px], ..., AOI Name ... (--screen)",
     "columns": "Any other table, such as GazeBase's; --columns says what its columns are",
 }
 """What each format is, with the columns by which it is recognised."""
