@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 PIECE_S = 0.05
 """A chunk holds what a tracker would have seen in this much real time; chosen: no delay that a person notices."""
+LARGEST_CHUNK = 1000
+"""Samples; with pupils and openness that is 160 KB, and the gateway takes 256 KB."""
 LONGEST_MARKER = 10_000
 """Characters of a marker's text, as the mesh accepts it."""
 
@@ -58,7 +60,7 @@ def stream(
 
     samples = found.samples
     length_s = samples[-1].t - samples[0].t
-    per_chunk = max(1, round(len(samples) / max(length_s, 1e-9) * PIECE_S * speed))
+    per_chunk = min(LARGEST_CHUNK, max(1, round(len(samples) / max(length_s, 1e-9) * PIECE_S * speed)))
     answer: dict[str, Any] = {}
     begun_anew: list[str] = []
     with Progress(console=Console(stderr=True)) as progress:

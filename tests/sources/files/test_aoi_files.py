@@ -129,7 +129,7 @@ def test_fixations_of_pupil_cloud_are_names_over_their_time(tmp_path: Path) -> N
 def test_recording_of_several_is_asked_for(tmp_path: Path) -> None:
     other = "s,r2,1,1700000001000000000,1700000001250000000,250\n"
     (tmp_path / "fixations.csv").write_text(FIXATIONS + other)
-    with pytest.raises(InvalidSettings, match=r"holds several recordings.*--recording r1"):
+    with pytest.raises(InvalidSettings, match=r"fixations.csv holds several recordings, the second one from line 5"):
         read(tmp_path, AOI_FIXATIONS, "aoi_fixations.csv")
     assert read(tmp_path, AOI_FIXATIONS, "aoi_fixations.csv", recording="r2").samples[0].aoi is None
 

@@ -78,3 +78,18 @@ def test_unknown_validity_is_reported(tmp_path: Path) -> None:
     text = STUDIO_MM.replace("\t57.2\t0\t305", "\t57.2\tgood\t305")
     with pytest.raises(MalformedMessage, match=r"gaze.tsv:2: ValidityLeft: 'good'"):
         read(tmp_path, text, screen_mm=SIZE, origin=Origin.TOP_LEFT)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Recording timestamp [ms]\tRecording name\tGaze point X [DACS px]\tGaze point Y [DACS px]\n5\tr1\t500\t250\n6\tr2\t100\t250\n7\tr2\t100\t250\n",
+        "timestamp [ns],recording id,gaze x [px],gaze y [px]\n5,r1,500,250\n1,r2,100,250\n9,r2,100,250\n",
+    ],
+    ids=["tobii", "neon"],
+)
+def test_recordings_of_two_persons_are_never_one_gaze(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InvalidSettings, match=r"holds several recordings, the second one from line 3: .*--recording"):
+        read(tmp_path, text)
+    assert [s.x for s in read(tmp_path, text, recording="r1").samples] == [0.5]
+    assert [s.x for s in read(tmp_path, text, recording="r2").samples] == [0.1, 0.1]

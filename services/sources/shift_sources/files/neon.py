@@ -11,11 +11,13 @@ from __future__ import annotations
 from functools import partial
 
 from shift_sources.files.options import Options, ScreenSize
+from shift_sources.files.recordings import OneRecording
 from shift_sources.files.samples import Sample, lost_sample, named_sample
 from shift_sources.files.surface_names import surface_name
 from shift_sources.files.table import Row, TableFormat, table_reader
 
 NANOSECONDS = 1e9
+RECORDING = "recording id"
 TIME = "timestamp [ns]"
 PIXELS = ("gaze x [px]", "gaze y [px]")
 SURFACE = ("gaze position on surface x [normalized]", "gaze position on surface y [normalized]")
@@ -52,7 +54,10 @@ def _recognise_pixels(header: list[str], options: Options) -> TableFormat | None
     if not {TIME, *PIXELS} <= set(header):
         return None
     sample = partial(_in_pixels, screen=options.screen)
-    return TableFormat("Neon", TIME, (TIME, *PIXELS), sample, ticks=NANOSECONDS, separator=",", pixels=True)
+    return TableFormat(
+        "Neon", TIME, (TIME, *PIXELS), sample, ticks=NANOSECONDS, separator=",", pixels=True,
+        taken=OneRecording([RECORDING], options.recording),
+    )  # fmt: skip
 
 
 def _recognise_surface(header: list[str], options: Options) -> TableFormat | None:
@@ -61,7 +66,8 @@ def _recognise_surface(header: list[str], options: Options) -> TableFormat | Non
         return None
     sample = partial(_name, options=options) if options.named else _on_surface
     return TableFormat(
-        "Neon surface", TIME, columns, sample, ticks=NANOSECONDS, separator=",", named=options.named
+        "Neon surface", TIME, columns, sample, ticks=NANOSECONDS, separator=",", named=options.named,
+        taken=OneRecording([RECORDING], options.recording),
     )  # fmt: skip
 
 

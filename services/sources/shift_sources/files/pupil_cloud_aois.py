@@ -15,6 +15,7 @@ from shift_schemas.errors import InvalidSettings
 
 from shift_sources.files.aoi_names import study_name
 from shift_sources.files.options import Options
+from shift_sources.files.recordings import OneRecording
 from shift_sources.files.samples import Gaze, Sample, named_sample, since_first
 from shift_sources.files.table import Header, Row, cells_of
 from shift_sources.files.text_file import TextFile, opened
@@ -52,7 +53,8 @@ def _names(file: TextFile, parts: list[str], label: str, options: Options) -> di
     """Return the study's name of the first AOI of each fixation."""
     names: dict[Key, str | None] = {}
     for row in _table(file, {FIXATION, label}).rows:
-        if row.text(FIXATION) and _is_taken(row, options):
+        ours = RECORDING not in row.columns or row.text(RECORDING).startswith(options.recording)
+        if ours and row.text(FIXATION):
             key = _key(row, parts)
             names[key] = names.get(key) or _name(row, label, options)
     return names
@@ -62,24 +64,13 @@ def _name(row: Row, label: str, options: Options) -> str | None:
     return study_name(row.text(label), options, lambda rule: row.wrong(label, rule))
 
 
-def _is_taken(row: Row, options: Options) -> bool:
-    return RECORDING not in row.columns or row.text(RECORDING).startswith(options.recording)
-
-
 def _fixations(table: _Table, options: Options) -> Iterator[tuple[int, int, Row]]:
     """Yield start and end of each fixation of one recording, in nanoseconds."""
-    recording = ""
+    is_taken = OneRecording([RECORDING], options.recording)
     before = -1
     for row in table.rows:
-        if not _is_taken(row, options):
+        if not is_taken(row):
             continue
-        found = row.text(RECORDING) if RECORDING in row.columns else ""
-        if recording and found != recording:
-            raise InvalidSettings(
-                f"{row.file} holds several recordings, such as {recording} and {found}: take one with --recording "
-                f"{recording[:8]}"
-            )
-        recording = found
         start, end = row.ticks(START), row.ticks(END)
         if start is None or start < before:
             raise row.wrong(START, "nanoseconds, at or after the end of the fixation before")

@@ -103,6 +103,8 @@ class TableFormat:
     """Whether positions are in pixels of the screen, whose size must be given."""
     named: bool = False
     """Whether the samples are AOI names and not points."""
+    taken: Callable[[Row], bool] | None = None
+    """Returns whether a row belongs to the recording that is read; None: all rows do."""
 
 
 Recogniser = Callable[[list[str], Options], TableFormat | None]
@@ -169,6 +171,8 @@ def _samples(file: TextFile, table: TableFormat, header: Header, header_line: in
         if number <= header_line or not line.strip():
             continue
         row = Row(file.name, number, header, cells_of(line, table.separator), table.decimal_comma)
+        if table.taken is not None and not table.taken(row):
+            continue
         time = row.ticks(table.time_column)
         if time is None or (time <= before and not table.repeats):
             raise row.wrong(table.time_column, "the tracker's clock, rising from row to row")

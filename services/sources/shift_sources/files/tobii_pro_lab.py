@@ -3,7 +3,8 @@
 The header says the unit in brackets where it does (``Recording timestamp [ms]``, ``Gaze point X [DACS px]``). Without a
 unit the time is in microseconds (Pro Lab) or milliseconds (Studio), and positions are in pixels. Positions in
 millimetres need ``--screen-mm``; those of Studio (``ADCSmm``) need ``--origin`` too, since the file does not say where
-they begin. Rows of other sensors and rows of events are no samples. Names of participants and recordings are not read.
+they begin. Rows of other sensors and rows of events are no samples. A table of several recordings needs
+``--recording``. Names of participants are not read.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from shift_schemas.errors import InvalidSettings
 
 from shift_sources.files.options import Options, Origin
 from shift_sources.files.positions import Point, from_upper_left
+from shift_sources.files.recordings import OneRecording
 from shift_sources.files.samples import Eyes, Sample, named_sample, sample_of_eyes
 from shift_sources.files.table import Row, TableFormat, table_reader
 from shift_sources.files.tobii_aois import aoi_hit, hit_columns
@@ -23,6 +25,7 @@ from shift_sources.files.tobii_columns import PointColumns, TobiiColumns, find_c
 VALID = frozenset({"valid", "0", "1"})
 """Pro Lab writes Valid and Invalid. Studio writes 0 (certain) to 4 (not found) in ``ValidityLeft``."""
 INVALID = frozenset({"invalid", "2", "3", "4", ""})
+RECORDINGS = ("Recording name", "RecordingName")
 EYE_TRACKER = "eye tracker"
 MOVEMENT = "Eye movement type"
 NOT_FOUND = re.compile("EyesNotFound")
@@ -109,18 +112,19 @@ def _recognise(header: list[str], options: Options) -> TableFormat | None:
     columns, hits = find_columns(header, options.screen is None and options.screen_mm is not None), hit_columns(header)
     if columns is None or not (columns.points or hits):
         return None
+    taken = OneRecording(RECORDINGS, options.recording)
     named = bool(hits) and (options.named or not columns.points)
     if named:
         names = partial(_name, columns=columns, hits=hits, options=options)
         return TableFormat(
             "Tobii", columns.time, (columns.time, *hits), names, columns.ticks, repeats=True, decimal_comma=True,
-            named=True,
+            named=True, taken=taken,
         )  # fmt: skip
     convert = _conversion(columns, options) or partial(_converted, width=1, height=1, origin=Origin.TOP_LEFT)
     points = partial(_point, columns=columns, convert=convert)
     return TableFormat(
         "Tobii", columns.time, (columns.time, columns.points[0].x), points, columns.ticks, repeats=True,
-        decimal_comma=True, pixels=columns.kind == "px",
+        decimal_comma=True, pixels=columns.kind == "px", taken=taken,
     )  # fmt: skip
 
 
