@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -160,3 +161,29 @@ def test_written_hits_are_read_back(hits: list[list[bool]]) -> None:
     with TemporaryDirectory() as folder:
         found = read(Path(folder), "\n".join([head, *rows]) + "\n")
     assert [s.aoi for s in found.samples] == [f"a{row.index(True)}" if any(row) else None for row in hits]
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 9), st.integers(1, 20), st.sampled_from(["", "cup", "robot"])), min_size=1, max_size=10
+    )
+)
+def test_written_fixations_are_read_back(fixations: list[tuple[int, int, str]]) -> None:
+    """Each fixation has a pause before it and a duration, in units of 30 ms, and its AOI."""
+    expected, rows, aois, time = {}, [], [], 0
+    for i, (pause, duration, aoi) in enumerate(fixations):
+        start, time = time + pause, time + pause + duration
+        rows.append(f"s,r,{i},{start * 30_000_000},{time * 30_000_000},0")
+        aois += [f"x,{aoi},s,r,{i},0"] if aoi else []
+        expected |= dict.fromkeys(range(start, time), aoi or None)
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "fixations.csv").write_text("\n".join([FIXATIONS.splitlines()[0], *rows]) + "\n")
+        found = read(
+            Path(folder), "\n".join([AOI_FIXATIONS.splitlines()[0], *aois]) + "\n", "aoi_fixations.csv"
+        ).samples
+    first = min(expected)
+    for tick, aoi in expected.items():
+        middle = (tick - first + 0.5) * 0.03
+        assert [s.aoi for s in found if s.t <= middle][-1] == aoi
+    assert found[-1].aoi is None
+    assert all(b.t - a.t < 0.3 for a, b in pairwise(found) if a.aoi)

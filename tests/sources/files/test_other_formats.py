@@ -141,6 +141,11 @@ def test_screen_that_contradicts_the_file_is_refused(tmp_path: Path, text: str) 
         read(tmp_path, text, screen=ScreenSize(1280, 720))
 
 
+def test_screen_of_which_the_experiment_wrote_the_size_for_the_last_pixel(tmp_path: Path) -> None:
+    text = EYELINK.replace("1919 1079", "1920 1080")
+    assert read(tmp_path, text, screen=ScreenSize(1920, 1080)).samples == read(tmp_path, EYELINK).samples
+
+
 @pytest.mark.parametrize("text", [GLASSES_3, GLASSES_2, EYELINK, SMI])
 def test_aoi_names_are_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(InvalidSettings, match="has no AOI names"):
@@ -212,11 +217,20 @@ def smi(samples: Points) -> str:
     return "\n".join(["## Calibration Area:\t1000\t500", "Time\tType\tTrial\tR POR X [px]\tR POR Y [px]", *rows]) + "\n"
 
 
-@pytest.mark.parametrize("write", [glasses_3, glasses_2, eyelink, smi])
+def begaze(samples: Points) -> str:
+    rows = [
+        f"{i * 10}\t-\t-" if p is None else f"{i * 10}\t{p[0] * 1000!r}\t{p[1] * 500!r}" for i, p in enumerate(samples)
+    ]
+    head = "RecordingTime [ms]\tPoint of Regard Binocular X [px]\tPoint of Regard Binocular Y [px]"
+    return "\n".join([head, *rows]) + "\n"
+
+
+@pytest.mark.parametrize("write", [glasses_3, glasses_2, eyelink, smi, begaze])
 @given(samples=points)
 def test_what_is_written_is_read_back(write: Any, samples: Points) -> None:
+    said = {"screen": ScreenSize(1000, 500)} if write is begaze else {}
     with TemporaryDirectory() as folder:
-        found = read(Path(folder), write(samples)).samples
+        found = read(Path(folder), write(samples), **said).samples
     assert len(found) == len(samples)
     for i, (sample, point) in enumerate(zip(found, samples, strict=True)):
         assert sample.t == pytest.approx(i / 100, abs=1e-6)
@@ -232,4 +246,6 @@ def test_raw_data_of_begaze_are_points_or_names(tmp_path: Path) -> None:
     assert [(s.aoi, s.valid) for s in named.samples] == [("cup", True), (None, False)]
     with pytest.raises(InvalidSettings, match="--screen 1920x1080"):
         read(tmp_path, BEGAZE)
+    later = "Raw Data Export\n\n" + BEGAZE.replace(",", "\t")
+    assert read(tmp_path, later, screen=ScreenSize(1680, 1050)).samples == found.samples
     assert "Ada" not in repr(found)

@@ -2,7 +2,7 @@
 
 Positions are in pixels of ``--screen``. A cell with ``-`` is lost, and so is 0 and 0, and an eye of the category Blink.
 Rows of other groups of categories than Eye, such as messages, are skipped. ``AOI Name ..`` names the AOI of an eye; the
-first of the table's eyes that is on one counts. The participant's name is not read.
+first of the table's eyes that is on one counts. Lines before the table, and the participant's name, are not read.
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from functools import partial
 
 from shift_sources.files.aoi_names import study_name
 from shift_sources.files.options import Options, ScreenSize
-from shift_sources.files.samples import Eyes, Sample, named_sample, sample_of_eyes
-from shift_sources.files.table import SEPARATORS, Reader, Row, TableFormat, table_reader
+from shift_sources.files.samples import Eyes, Gaze, Sample, named_sample, sample_of_eyes
+from shift_sources.files.table import SEPARATORS, Reader, Row, TableFormat, cells_of, gaze_of_table
+from shift_sources.files.text_file import TextFile
 
 TIME = "RecordingTime [ms]"
 MILLISECONDS = 1e3
@@ -67,26 +68,34 @@ def _aoi(row: Row, column: str, options: Options) -> str | None:
     return None if text in NOTHING else study_name(text, options, lambda rule: row.wrong(column, rule))
 
 
-def _reader(separator: str) -> Reader:
-    def recognise(header: list[str], options: Options) -> TableFormat | None:
-        there = tuple(side for side in (BOTH, *SIDES) if set(_columns(side)) <= set(header))
-        sides = there[:1] if BOTH in there else there
-        aois = tuple(name for side in (BOTH, *SIDES) if (name := f"AOI Name {side}") in header)
-        if TIME not in header or not (sides or aois):
-            return None
-        named = bool(aois) and (options.named or not sides)
-        screen = options.screen or ScreenSize(1, 1)
-        sample = (
-            partial(_name, sides=sides, aois=aois, options=options)
-            if named
-            else partial(_point, sides=sides, screen=screen)
-        )
-        return TableFormat(
-            "SMI BeGaze", TIME, (TIME,), sample, MILLISECONDS, separator, repeats=True, decimal_comma=separator != ",",
-            pixels=not named, named=named,
-        )  # fmt: skip
-
-    return table_reader(recognise)
+def _recognise(header: list[str], options: Options, separator: str) -> TableFormat | None:
+    there = tuple(side for side in (BOTH, *SIDES) if set(_columns(side)) <= set(header))
+    sides = there[:1] if BOTH in there else there
+    aois = tuple(name for side in (BOTH, *SIDES) if (name := f"AOI Name {side}") in header)
+    if TIME not in header or not (sides or aois):
+        return None
+    named = bool(aois) and (options.named or not sides)
+    screen = options.screen or ScreenSize(1, 1)
+    sample = (
+        partial(_name, sides=sides, aois=aois, options=options)
+        if named
+        else partial(_point, sides=sides, screen=screen)
+    )
+    return TableFormat(
+        "SMI BeGaze", TIME, (TIME,), sample, MILLISECONDS, separator, repeats=True, decimal_comma=separator != ",",
+        pixels=not named, named=named,
+    )  # fmt: skip
 
 
-FORMATS = {"begaze": tuple(_reader(separator) for separator in SEPARATORS)}
+def _read(file: TextFile, options: Options) -> Gaze | None:
+    for number, line in enumerate(file.head, start=1):
+        if TIME not in line:
+            continue
+        for separator in SEPARATORS:
+            header = cells_of(line, separator)
+            if (table := _recognise(header, options, separator)) is not None:
+                return gaze_of_table(file, table, header, options, number)
+    return None
+
+
+FORMATS: dict[str, tuple[Reader, ...]] = {"begaze": (_read,)}

@@ -116,7 +116,10 @@ def _take_coordinates(file: TextFile, message: str, state: _State, options: Opti
     if right <= left or bottom <= top:
         return
     state.left, state.top = left, top
-    state.screen = ScreenSize(round(right - left) + 1, round(bottom - top) + 1)
+    width, height = round(right - left), round(bottom - top)
+    state.screen = ScreenSize(width + 1, height + 1)
+    if options.screen == ScreenSize(width, height):  # the experiment wrote 1920 where the last pixel is 1919
+        state.screen = options.screen
     check_screen(file.name, state.screen, options)
 
 

@@ -2,7 +2,8 @@
 
 ``gaze_positions.csv`` is gaze in the scene camera's picture; ``gaze_positions_on_surface_NAME.csv`` is gaze on a
 surface, which the study's stimulus can be, or, with ``--aoi``, an AOI. Where both eyes are tracked one by one, a time
-can repeat. Pupil sizes are in another table, ``pupil_positions.csv``, which is not read.
+can repeat. Older versions write ``on_srf`` for ``on_surf``. Pupil sizes are in another table, ``pupil_positions.csv``,
+which is not read.
 """
 
 from __future__ import annotations
@@ -45,19 +46,23 @@ def _table(name: str, time_column: str, x_column: str, y_column: str, on_surface
     return TableFormat(name, time_column, columns, sample, ticks=1, separator=",", repeats=True)
 
 
-def _surface(time_column: str) -> Reader:
-    points = _table("Pupil Core surface", time_column, "x_norm", "y_norm", "on_surf")
+def _surface(time_column: str, on_surface: str) -> Reader:
+    points = _table("Pupil Core surface", time_column, "x_norm", "y_norm", on_surface)
 
     def recognise(header: list[str], options: Options) -> TableFormat | None:
         if not set(points.columns) <= set(header):
             return None
-        names = partial(_name, on_surface="on_surf", options=options)
+        names = partial(_name, on_surface=on_surface, options=options)
         return replace(points, sample=names, named=True) if options.named else points
 
     return table_reader(recognise)
 
 
-FORMATS = {
+FORMATS: dict[str, tuple[Reader, ...]] = {
     "pupil": (is_table(_table("Pupil Core", "gaze_timestamp", "norm_pos_x", "norm_pos_y")),),
-    "pupil-surface": (_surface("gaze_timestamp"), _surface("world_timestamp")),
+    "pupil-surface": tuple(
+        _surface(time_column, on_surface)
+        for time_column in ("gaze_timestamp", "world_timestamp")
+        for on_surface in ("on_surf", "on_srf")
+    ),
 }
