@@ -161,6 +161,8 @@ def test_aoi_names_are_refused(tmp_path: Path, text: str) -> None:
         (GLASSES_3.replace('"data":{}}', '"data":'), "gaze.txt:3: line: "),
         (GLASSES_2.replace('"s":4,', ""), "gaze.txt:5: s: 'null'"),
         (EYELINK.replace("192.0", "19x.0"), "gaze.txt:18: left x: '19x.0'"),
+        (EYELINK.replace("102\t", "1020000000000000\t"), "gaze.txt:18: time: '1.02e+12 s after the first sample'"),
+        (EYELINK.replace("700.0", "7000000.0"), "gaze.txt:18: pupil_left: '7e+06'"),
         (EYELINK.replace("102\t", "99\t"), "gaze.txt:18: time: '99'"),
         (EYELINK.replace("102\t", "1o2\t"), "gaze.txt:18: time: '1o2'"),
         (EYELINK.replace("102\t", "x102\t"), "gaze.txt:18: line: 'x102"),

@@ -41,7 +41,7 @@ def _seen(row: Row, side: str) -> tuple[float, float] | None:
 def _pupils(row: Row) -> Eyes:
     names = [f"Pupil Diameter {side} [mm]" for side in SIDES]
     sizes = [_value(row, name) if name in row.columns else None for name in names]
-    return Eyes(*(size or None for size in sizes))
+    return Eyes(*(size if size is not None and size > 0 else None for size in sizes))
 
 
 def _is_sample(row: Row) -> bool:

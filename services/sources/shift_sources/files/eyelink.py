@@ -21,7 +21,8 @@ from shift_sources.files.text_file import TextFile
 
 MILLISECONDS = 1e3
 MESSAGE = re.compile(r"MSG\s+(\S+)\s?(.*)")
-COORDINATES = re.compile(r"\b(?:GAZE|DISPLAY)_COORDS\s*=?\s*" + r"\s+".join([r"(-?\d+(?:\.\d+)?)"] * 4))
+COORDINATES = re.compile(r"\b(?:GAZE|DISPLAY)_COORDS\s*=?\s*" + r"\s+".join([r"(-?\d{1,6}(?:\.\d+)?)"] * 4))
+NUMBER = re.compile(r"-?\d{1,20}(\.\d{0,20})?(e[+-]?\d\d)?")
 EVENTS = frozenset(
     ("START", "END", "SFIX", "EFIX", "SSACC", "ESACC", "SBLINK", "EBLINK", "INPUT", "BUTTON", "PRESCALER", "VPRESCALER")
 ) | {"EVENTS", "PUPIL", "FRAME"}
@@ -59,7 +60,7 @@ class _Line:
         word = self.words[i]
         if word in LOST:
             return None
-        if re.fullmatch(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", word, re.IGNORECASE) is None:
+        if NUMBER.fullmatch(word) is None:
             raise self.file.wrong(self.line, name, word, "a number, or . where it was lost")
         return float(word)
 
@@ -86,7 +87,7 @@ def _events(file: TextFile, options: Options) -> Iterator[Event]:
 
 
 def _time(file: TextFile, number: int, word: str) -> float:
-    if re.fullmatch(r"\d+(\.\d+)?", word) is None:
+    if NUMBER.fullmatch(word) is None or word.startswith("-"):
         raise file.wrong(number, "time", word, "milliseconds")
     return float(word)
 
@@ -137,7 +138,7 @@ def _sample(line: _Line, state: _State) -> Sample:
     pupils: dict[str, float | None] = {}
     for i, side in enumerate(state.eyes):
         x, y, pupil = (line.number(3 * i + k, f"{side} {n}") for k, n in enumerate(("x", "y", "pupil"), start=1))
-        pupils[f"pupil_{side}"] = pupil or None
+        pupils[f"pupil_{side}"] = pupil if pupil is not None and pupil > 0 else None
         if x is not None and y is not None:
             points.append(((x - state.left) / state.screen.width, (y - state.top) / state.screen.height))
     return sample_of_eyes(0.0, points, Eyes(**pupils))

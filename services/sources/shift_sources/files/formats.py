@@ -24,7 +24,7 @@ from shift_sources.files import (
     tx300,
 )
 from shift_sources.files.options import Options, ScreenSize
-from shift_sources.files.samples import Gaze, Marker, Sample
+from shift_sources.files.samples import NO_EYES, Eyes, Gaze, Marker, Sample
 from shift_sources.files.table import Reader
 from shift_sources.files.text_file import TextFile, opened
 
@@ -57,6 +57,12 @@ ABOUT = {
 """What each format is, with the columns by which it is recognised."""
 
 
+LONGEST_S = 1e9
+"""Seconds, 30 years: more is a wrong unit or a damaged number."""
+LARGEST_EYE = 1_000_000
+"""The largest pupil size and openness that a chunk can have."""
+
+
 class GazeFile(NamedTuple):
     """A gaze file that was read whole."""
 
@@ -87,7 +93,7 @@ def read_samples(path: Path, screen: ScreenSize | None = None, format_: str = ""
     options = Options(screen=screen)
     formats = _accepted(format_, options)
     with opened(path) as file:
-        for item in _recognised(file, formats, options).items:
+        for item in _within_limits(file, _recognised(file, formats, options)):
             if isinstance(item, Sample):
                 yield item
 
@@ -100,12 +106,24 @@ def read_gaze(path: Path, options: Options | None = None, format_: str = "") -> 
     markers: list[Marker] = []
     with opened(path) as file:
         gaze = _recognised(file, formats, options)
-        for item in gaze.items:
+        for item in _within_limits(file, gaze):
             if isinstance(item, Sample):
                 samples.append(item)
             else:
                 markers.append(item)
     return GazeFile(samples, markers, gaze.named)
+
+
+def _within_limits(file: TextFile, gaze: Gaze) -> Iterator[Sample | Marker]:
+    """Yield the items. Raise :class:`MalformedMessage` for a number that the mesh does not accept."""
+    for item in gaze.items:
+        if not -LONGEST_S < item.t < LONGEST_S:
+            raise file.wrong(file.line, "time", f"{item.t:g} s after the first sample", "a time of the same recording")
+        if isinstance(item, Sample) and item.eyes is not NO_EYES:
+            for name, value in zip(Eyes._fields, item.eyes, strict=True):
+                if value is not None and not 0 <= value <= LARGEST_EYE:
+                    raise file.wrong(file.line, name, f"{value:g}", f"0 to {LARGEST_EYE}, or nothing where it was lost")
+        yield item
 
 
 def _accepted(format_: str, options: Options) -> Mapping[str, tuple[Reader, ...]]:

@@ -78,7 +78,7 @@ def _name(t: float, row: Row, mapped: ColumnMap, cells: _Cells, options: Options
 
 def _eyes(row: Row, mapped: ColumnMap, cells: _Cells) -> Eyes:
     said = {name: cells.value(row, mapped.columns[name]) for name in Eyes._fields if name in mapped.columns}
-    return Eyes(**said)
+    return Eyes(**{name: value if value is not None and value >= 0 else None for name, value in said.items()})
 
 
 def _conversion(unit: str, options: Options) -> Convert:

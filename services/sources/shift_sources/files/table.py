@@ -17,6 +17,8 @@ from shift_sources.files.samples import Gaze, Sample
 from shift_sources.files.text_file import TextFile, mistake
 
 MICROSECONDS = 1_000_000
+LONGEST_TIME = 20
+"""Digits of a whole time; nanoseconds since 1970 have 19."""
 SEPARATORS = ("\t", ",", ";")
 
 
@@ -70,7 +72,8 @@ class Row:
     def ticks(self, column: str) -> float | None:
         """Return a time as :meth:`number` does. A whole number keeps all of its digits."""
         text = self.text(column)
-        return int(text) if text.isdecimal() and text.isascii() else self.number(column)
+        whole = text.isdecimal() and text.isascii() and len(text) <= LONGEST_TIME
+        return int(text) if whole else self.number(column)
 
     def wrong(self, column: str, rule: str) -> MalformedMessage:
         """Return the error that this cell does not follow ``rule``."""

@@ -35,10 +35,14 @@ class TextFile:
         self._rest = (self._whole(line) for line in iter(lambda: lines.readline(LONGEST_LINE), ""))
         self.head = list(islice(self._rest, HEAD))
         """The first lines, with their line ends."""
+        self.line = 0
+        """The number of the line that was read last, from 1."""
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Yield each line with its number, from 1. A file is read once."""
-        return enumerate(chain(self.head, self._rest), start=1)
+        for number, text in enumerate(chain(self.head, self._rest), start=1):
+            self.line = number
+            yield number, text
 
     def wrong(self, line: int, field: str, value: str, rule: str) -> MalformedMessage:
         """Return the error that a field of a line does not follow ``rule``."""

@@ -19,6 +19,8 @@ from shift_sources.files.table import Reader, refuse_names
 from shift_sources.files.text_file import TextFile
 
 MICROSECONDS = 1e6
+LARGEST = 1e20
+"""Larger than any time in microseconds."""
 SIDES = ("left", "right")
 Event = tuple[float, Sample | str]
 
@@ -37,7 +39,7 @@ class _Record:
 
     def number(self, name: str, value: Any) -> float:
         """Return a number of the object. Raise :class:`MalformedMessage`."""
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not -LARGEST < value < LARGEST:
             raise self.file.wrong(self.line, name, json.dumps(value), "a number")
         return value
 
