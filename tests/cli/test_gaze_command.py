@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from shift_cli.gaze_playing import describe, in_order, nothing_counted
+from shift_cli.gaze_playing import check_names, describe, in_order, nothing_counted
 from shift_cli.main import app
+from shift_schemas.errors import MalformedMessage
 from shift_schemas.messages import GazeChunk
 from shift_sources.files.formats import ABOUT, GazeFile
 from shift_sources.files.samples import Marker, Sample
@@ -47,6 +48,14 @@ def test_names_are_described_as_names() -> None:
 def test_names_that_count_nowhere_are_explained() -> None:
     said = describe([Sample(0.0, None, None, True), Sample(0.1, None, None, False)], named=True)
     assert "on no AOI; check the names" in nothing_counted(said, True, {}, {})
+
+
+def test_names_that_the_study_does_not_have_are_explained_before_anything_is_sent() -> None:
+    found = GazeFile([Sample(0.0, None, None, True, aoi="robots"), Sample(0.1, None, None, True)], [], named=True)
+    config = {"aois": [{"name": "robot"}, {"name": "cup"}]}
+    with pytest.raises(MalformedMessage, match=r"have: robots\. The study has robot, cup\. .* did you mean 'robot'"):
+        check_names(found, config, "hits.tsv")
+    check_names(GazeFile([found.samples[0]._replace(aoi="cup")], [], named=True), config, "hits.tsv")
 
 
 def test_every_format_is_listed_as_text_and_as_json() -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from shift_cli.gaze_playing import describe, nothing_counted, stream
+from shift_cli.gaze_playing import check_names, describe, nothing_counted, stream
 from shift_cli.screen_option import pixels_of
 
 if TYPE_CHECKING:
@@ -104,6 +104,8 @@ def play(
     if not markers:
         found = found._replace(markers=[])
     with RestClient(url) as shift:
+        if found.named:
+            check_names(found, shift.config(session), file.name)
         before = shift.observation(session)["gaze"]
         warnings = stream(shift, session, found, source or _source_of(file), file.name, speed)
         after = shift.observation(session)["gaze"]

@@ -99,6 +99,22 @@ def in_order(found: GazeFile, per_chunk: int, source: str) -> Iterator[tuple[flo
             yield marker.t, marker
 
 
+def check_names(found: GazeFile, config: dict[str, Any], name: str) -> None:
+    """Raise :class:`MalformedMessage` if the file names an AOI that the study in force does not have."""
+    from shift_schemas.errors import MalformedMessage
+    from shift_schemas.suggestions import did_you_mean
+
+    known = [aoi["name"] for aoi in config.get("aois", ())]
+    used = dict.fromkeys(sample.aoi for sample in found.samples if sample.aoi is not None)
+    unknown = [aoi for aoi in used if aoi not in known]
+    if unknown:
+        raise MalformedMessage(
+            f"{name} names AOIs that the study does not have: {', '.join(unknown)}. The study has {', '.join(known)}. "
+            f"Name each as the study does with --aoi-map '{unknown[0]}=NAME', or make it no AOI with --aoi-map "
+            f"'{unknown[0]}='{did_you_mean(unknown[0], known)}"
+        )
+
+
 def nothing_counted(said: Described, named: bool, before: dict[str, Any], after: dict[str, Any]) -> str:
     """Return why the gaze had no dwell on an AOI; empty if it had some, or if the session does not say."""
     if said.lost == 1.0:

@@ -87,6 +87,12 @@ def test_names_of_aois_are_taken_where_there_are_no_points(tmp_path: Path) -> No
     assert read(tmp_path, both, "t=time:s,x=gx:norm,y=gy:norm,aoi=target", named=True).samples[0].aoi == "cup"
 
 
+def test_validity_of_names_is_as_the_line_says(tmp_path: Path) -> None:
+    text = "time,target,ok\n0,cup,1\n1,cup,0\n"
+    found = read(tmp_path, text, "t=time:s,aoi=target,valid=ok")
+    assert [(s.aoi, s.valid) for s in found.samples] == [("cup", True), (None, False)]
+
+
 def test_names_of_columns_may_have_colons_and_commas(tmp_path: Path) -> None:
     text = 'TIME(10:00:00),"x, left",y\n1,0.5,0.25\n'
     assert points(read(tmp_path, text, "t=TIME(10:00:00):s,x=x, left:norm,y=y:norm")) == [(0.5, 0.25)]

@@ -51,6 +51,8 @@ class ColumnMap(NamedTuple):
     """Of all positions; empty: the table has no positions."""
     points: tuple[tuple[str, str, Validity | None], ...]
     """The columns of x, y and validity: of both eyes together, or of each."""
+    validities: tuple[Validity, ...]
+    """All columns of validity; a sample of AOI names is lost if none of them says valid."""
 
 
 def parse_columns(text: str, header: Sequence[str]) -> ColumnMap:
@@ -69,10 +71,12 @@ def parse_columns(text: str, header: Sequence[str]) -> ColumnMap:
     for field in (*EYES, "aoi"):
         if field in said:
             columns[field] = _known(field, said[field], header)
-    points = _points(said, columns, header)
+    validities = {field: _validity(field, said[field], header) for field in VALIDITIES if field in said}
+    points = _points(validities, columns)
     if not points and "aoi" not in columns:
         raise InvalidSettings(f"--columns needs x and y, or aoi, such as {EXAMPLE}")
-    return ColumnMap(columns, TIME_UNITS[time_unit], next(iter(units.values()), ""), points)
+    unit = next(iter(units.values()), "")
+    return ColumnMap(columns, TIME_UNITS[time_unit], unit, points, tuple(validities.values()))
 
 
 def _items(text: str) -> dict[str, str]:
@@ -116,17 +120,16 @@ def _known(field: str, column: str, header: Sequence[str]) -> str:
 
 
 def _points(
-    said: dict[str, str], columns: dict[str, str], header: Sequence[str]
+    validities: dict[str, Validity], columns: dict[str, str]
 ) -> tuple[tuple[str, str, Validity | None], ...]:  # fmt: skip
     found = []
     for side in ("", "left_", "right_"):
         x, y, valid = f"{side}x", f"{side}y", f"{side}valid"
         if (x in columns) != (y in columns):
             raise InvalidSettings(f"--columns needs {x} and {y} together, such as {EXAMPLE}")
-        validity = _validity(valid, said[valid], header) if valid in said else None
         if x in columns:
-            found.append((columns[x], columns[y], validity))
-        elif validity is not None and side:
+            found.append((columns[x], columns[y], validities.get(valid)))
+        elif valid in validities and (side or columns.keys() & set(POSITIONS)):
             raise InvalidSettings(f"--columns: {valid} needs {x} and {y}")
     if "x" in columns and len(found) > 1:
         raise InvalidSettings("--columns: give either x and y, or left_x, left_y, right_x and right_y")

@@ -69,7 +69,7 @@ def _point(t: float, row: Row, mapped: ColumnMap, cells: _Cells, convert: Conver
 
 def _name(t: float, row: Row, mapped: ColumnMap, cells: _Cells, options: Options) -> Sample:
     column = mapped.columns["aoi"]
-    tracked = all(cells.is_valid(row, validity) for _, _, validity in mapped.points)
+    tracked = not mapped.validities or any(cells.is_valid(row, validity) for validity in mapped.validities)
     text = row.text(column)
     lost = text in cells.lost
     name = None if lost else study_name(text, options, lambda rule: row.wrong(column, rule))
