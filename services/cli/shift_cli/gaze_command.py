@@ -60,6 +60,9 @@ def play(
         str,
         _of_file("Where positions begin: top-left, bottom-left, centre (y upwards), centre-down.", "SHIFT_ORIGIN"),
     ] = "",
+    time_unit: Annotated[
+        str, _of_file("Unit of a time that has none in the header of a Tobii table: ms.", "SHIFT_TIME_UNIT")
+    ] = "",
     aoi: Annotated[
         bool, _of_file("Take AOI names from a file that has points too; left out: the points.", "SHIFT_AOI")
     ] = False,
@@ -90,13 +93,14 @@ def play(
     from shift_runtime.rest_client import RestClient
     from shift_schemas.errors import MalformedMessage, check_id
     from shift_sources.files.formats import read_gaze
-    from shift_sources.files.options import Options, aoi_map_of, lost_of, millimetres_of, origin_of
+    from shift_sources.files.options import Options, aoi_map_of, lost_of, millimetres_of, origin_of, time_unit_of
 
     if source is not None:
         check_id("--source", source)
     options = Options(
         screen=_screen(screen), screen_mm=millimetres_of(screen_mm), distance_mm=distance_mm, origin=origin_of(origin),
-        named=aoi, aoi_map=aoi_map_of(aoi_map or ()), recording=recording, columns=columns, lost=lost_of(lost),
+        time_unit=time_unit_of(time_unit), named=aoi, aoi_map=aoi_map_of(aoi_map or ()), recording=recording,
+        columns=columns, lost=lost_of(lost),
     )  # fmt: skip
     found = read_gaze(file, options, format_)
     if not found.samples:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from shift_schemas.errors import InvalidSettings, MalformedMessage
 from shift_sources.files.formats import GazeFile, read_gaze
-from shift_sources.files.options import Millimetres, Options, Origin, ScreenSize
+from shift_sources.files.options import Millimetres, Options, Origin, ScreenSize, time_unit_of
 from shift_sources.files.samples import Eyes, chunk_of
 
 MM = "Recording timestamp [ms]\tGaze point X [DACS mm]\tGaze point Y [DACS mm]\n1\t101,8\t57.2\n"
@@ -93,3 +93,17 @@ def test_recordings_of_two_persons_are_never_one_gaze(tmp_path: Path, text: str)
         read(tmp_path, text)
     assert [s.x for s in read(tmp_path, text, recording="r1").samples] == [0.5]
     assert [s.x for s in read(tmp_path, text, recording="r2").samples] == [0.1, 0.1]
+
+
+def test_unit_of_a_time_without_one_can_be_given(tmp_path: Path) -> None:
+    text = "Recording timestamp\tGaze point X\tGaze point Y\n0\t500\t250\n16\t500\t250\n"
+    assert read(tmp_path, text).samples[1].t == pytest.approx(16e-6), "microseconds, as in current versions"
+    assert read(tmp_path, text, time_unit="ms").samples[1].t == pytest.approx(0.016)
+    said = text.replace("timestamp", "timestamp [s]")
+    assert read(tmp_path, said, time_unit="ms").samples[1].t == 16.0, "the file says its unit"
+    with pytest.raises(InvalidSettings, match="did you mean 'ms'"):
+        time_unit_of("msec")
+
+
+def test_titta_is_read_with_commas_too(tmp_path: Path) -> None:
+    assert read(tmp_path, TITTA.replace("\t", ",")) == read(tmp_path, TITTA)

@@ -20,8 +20,8 @@ from typing import NamedTuple
 from shift_schemas.errors import InvalidSettings
 from shift_schemas.suggestions import did_you_mean
 
-TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
-"""Units of the time, with their number in a second."""
+from shift_sources.files.options import TIME_UNITS
+
 POSITION_UNITS = ("norm", "px", "mm", "deg")
 """0..1 of the stimulus, pixels, millimetres, degrees of visual angle."""
 POSITIONS = ("x", "y", "left_x", "left_y", "right_x", "right_y")

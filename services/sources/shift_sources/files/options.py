@@ -14,6 +14,9 @@ from shift_schemas.errors import InvalidSettings
 from shift_schemas.ids import is_id, not_an_id
 from shift_schemas.suggestions import did_you_mean
 
+TIME_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+"""Units of a time, with their number in a second."""
+
 
 @dataclass(frozen=True)
 class ScreenSize:
@@ -57,6 +60,8 @@ class Options:
     """From the eyes to the stimulus; needed for degrees."""
     origin: Origin | None = None
     """None: the format's own."""
+    time_unit: str = ""
+    """ms, us or s: of a time whose unit the file does not say; empty: the format's own."""
     named: bool = False
     """Whether AOI names are taken instead of points, where the file has both."""
     aoi_map: Mapping[str, str] = field(default_factory=dict)
@@ -88,6 +93,13 @@ def origin_of(text: str) -> Origin | None:
     except ValueError:
         known = [origin.value for origin in Origin]
         raise InvalidSettings(f"--origin is {text!r}: write {', '.join(known)}{did_you_mean(text, known)}") from None
+
+
+def time_unit_of(text: str) -> str:
+    """Return the unit. Raise :class:`InvalidSettings` for a text that is not one."""
+    if text not in ("", *TIME_UNITS):
+        raise InvalidSettings(f"--time-unit is {text!r}: write {', '.join(TIME_UNITS)}{did_you_mean(text, TIME_UNITS)}")
+    return text
 
 
 def aoi_map_of(pairs: Iterable[str]) -> dict[str, str]:

@@ -52,16 +52,18 @@ def _is_yes(row: Row, column: str) -> bool:
     return text in YES
 
 
-def _format(time_column: str, validity: str) -> TableFormat:
+def _format(time_column: str, validity: str, separator: str) -> TableFormat:
     point = "gaze_point_on_display_area"
     left, right = ((f"{e}_{point}_x", f"{e}_{point}_y", f"{e}_{validity}") for e in SIDES)
-    return TableFormat("Titta", time_column, (time_column, *left, *right), partial(_sample, eyes=(left, right)))
+    columns = (time_column, *left, *right)
+    return TableFormat("Titta", time_column, columns, partial(_sample, eyes=(left, right)), separator=separator)
 
 
 FORMATS = {
     "titta": tuple(
-        is_table(_format(time_column, validity))
+        is_table(_format(time_column, validity, separator))
         for time_column in ("device_time_stamp", "system_time_stamp")
         for validity in ("gaze_point_valid", "gaze_point_validity")
+        for separator in ("\t", ",")
     )
 }

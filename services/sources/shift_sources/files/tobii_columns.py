@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 from shift_schemas.errors import InvalidSettings
 
-TICKS = {"μs": 1e6, "µs": 1e6, "us": 1e6, "ms": 1e3, "s": 1.0}
+from shift_sources.files.options import TIME_UNITS, Options
+
+TICKS = {**TIME_UNITS, "μs": 1e6, "µs": 1e6}
 UNIT = r"(?: ?[\[(](?P<unit>[^])]+)[\])])?"
 TIME = re.compile(r"(Recording timestamp|RecordingTimestamp|EyeTrackerTimestamp)(?: \[(?P<unit>[^]]+)\])?")
 STUDIO_TIME = "RecordingTimestamp"
@@ -48,21 +50,22 @@ class TobiiColumns(NamedTuple):
     openness: tuple[str, str]
 
 
-def find_columns(header: list[str], prefer_mm: bool) -> TobiiColumns | None:
+def find_columns(header: list[str], options: Options) -> TobiiColumns | None:
     """Return the columns of a Tobii table; None if it has no time that can be read.
 
-    ``prefer_mm`` says that millimetres can be converted and pixels cannot. Raise :class:`InvalidSettings` if positions
+    Millimetres are used instead of pixels if only they can be converted. Raise :class:`InvalidSettings` if positions
     are in a unit that nothing can convert.
     """
     times = [(name, found) for name in header if (found := TIME.fullmatch(name))]
     if not times:
         return None
     time, said = times[0]
-    unit = said["unit"] or ("ms" if time == STUDIO_TIME else "us")
+    unit = said["unit"] or options.time_unit or ("ms" if time == STUDIO_TIME else "us")
     if unit not in TICKS:
         return None
     validities = {found["eye"].lower(): name for name in header if (found := VALIDITY.fullmatch(name))}
-    points, kind = _points(header, validities, ("norm", "mm", "px") if prefer_mm else KINDS)
+    only_mm = options.screen is None and options.screen_mm is not None
+    points, kind = _points(header, validities, ("norm", "mm", "px") if only_mm else KINDS)
     pupils, openness = (_of_eyes(header, pattern) for pattern in (PUPIL, OPENNESS))
     return TobiiColumns(time, TICKS[unit], points, kind, tuple(validities.values()), pupils, openness)
 

@@ -1,7 +1,8 @@
 """Tables of Tobii Pro Lab and Tobii Studio (TSV), also in UTF-16 and with decimal commas.
 
 The header says the unit in brackets where it does (``Recording timestamp [ms]``, ``Gaze point X [DACS px]``). Without a
-unit the time is in microseconds (Pro Lab) or milliseconds (Studio), and positions are in pixels. Positions in
+unit the time is in microseconds (Pro Lab) or milliseconds (Studio), or in ``--time-unit``, since older versions of Pro
+Lab write milliseconds; and positions are in pixels. Positions in
 millimetres need ``--screen-mm``; those of Studio (``ADCSmm``) need ``--origin`` too, since the file does not say where
 they begin. Rows of other sensors and rows of events are no samples. A table of several recordings needs
 ``--recording``. Names of participants are not read.
@@ -109,7 +110,7 @@ def _converted(x: float, y: float, width: float, height: float, origin: Origin) 
 
 
 def _recognise(header: list[str], options: Options) -> TableFormat | None:
-    columns, hits = find_columns(header, options.screen is None and options.screen_mm is not None), hit_columns(header)
+    columns, hits = find_columns(header, options), hit_columns(header)
     if columns is None or not (columns.points or hits):
         return None
     taken = OneRecording(RECORDINGS, options.recording)
