@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import re
 import secrets
-import time
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from shift_cli.gaze_playing import check_names, describe, nothing_counted, stream
 from shift_cli.screen_option import pixels_of
 
 if TYPE_CHECKING:
-    from shift_runtime.rest_client import RestClient
-    from shift_sources.files.samples import Sample
-    from shift_sources.files.table import ScreenSize
+    from shift_sources.files.options import ScreenSize
 
 app = typer.Typer(no_args_is_help=True, help="Gaze recordings.")
-PIECE_S = 0.05
-"""A chunk holds what a tracker would have seen in this much real time; chosen: no delay that a person notices."""
+FILE_OPTIONS = "What the file does not say"
+"""The heading of the options about units, sizes and names, in the help."""
+
+
+def _of_file(help_: str, envvar: str, **more: Any) -> Any:
+    """Return an option about what the file does not say."""
+    return typer.Option(help=help_, envvar=envvar, rich_help_panel=FILE_OPTIONS, **more)
 
 
 @app.callback()
@@ -39,13 +41,42 @@ def play(
     source: Annotated[
         str | None, typer.Option(help="Name of the gaze source; left out: one of its own.", envvar="SHIFT_SOURCE")
     ] = None,
-    screen: Annotated[
-        str, typer.Option(help="Size in pixels, for files with pixels: 1920x1080.", envvar="SHIFT_SCREEN")
-    ] = "",
+    markers: Annotated[
+        bool, typer.Option(help="Set the file's messages as markers of the session.", envvar="SHIFT_MARKERS")
+    ] = True,
     format_: Annotated[
         str,
         typer.Option("--format", help="Insist on this format; left out: by the content.", envvar="SHIFT_FORMAT"),
     ] = "",
+    screen: Annotated[str, _of_file("Size in pixels, for files with pixels: 1920x1080.", "SHIFT_SCREEN")] = "",
+    screen_mm: Annotated[
+        str, _of_file("Size in millimetres, for files with millimetres or degrees: 509x286.", "SHIFT_SCREEN_MM")
+    ] = "",
+    distance_mm: Annotated[
+        float | None,
+        _of_file("From the eyes to the screen, for files with degrees: 650.", "SHIFT_DISTANCE_MM", min=1),
+    ] = None,
+    origin: Annotated[
+        str,
+        _of_file("Where positions begin: top-left, bottom-left, centre (y upwards), centre-down.", "SHIFT_ORIGIN"),
+    ] = "",
+    time_unit: Annotated[
+        str, _of_file("Unit of a time that has none in the header of a Tobii table: ms.", "SHIFT_TIME_UNIT")
+    ] = "",
+    aoi: Annotated[
+        bool, _of_file("Take AOI names from a file that has points too; left out: the points.", "SHIFT_AOI")
+    ] = False,
+    aoi_map: Annotated[
+        list[str] | None,
+        _of_file("The study's name of a file's AOI: 'AOI 1=cup'; 'AOI 1=' is none. Repeatable.", "SHIFT_AOI_MAP"),
+    ] = None,
+    recording: Annotated[
+        str, _of_file("How the id of the recording begins, for files of several.", "SHIFT_RECORDING")
+    ] = "",
+    columns: Annotated[
+        str, _of_file("The columns of any other table: 't=time:ms,x=gx:px,y=gy:px'.", "SHIFT_COLUMNS")
+    ] = "",
+    lost: Annotated[str, _of_file("What means loss in a table with --columns: -1,9999.", "SHIFT_LOST")] = "",
 ) -> None:
     """Stream a recording of an eye tracker into a session, with its own timing.
 
@@ -56,25 +87,37 @@ def play(
     shift-mesh gaze play trial1.tsv.gz --session s1
     shift-mesh gaze play trial1.tsv.gz --session s1 --speed 20
     shift-mesh gaze play gaze.csv --session s1 --screen 1600x1200
+    shift-mesh gaze play all_gaze.csv --session s1 --aoi --aoi-map 'AOI 1=cup' --aoi-map 'AOI 2=robot'
+    shift-mesh gaze play own.csv --session s1 --columns 't=time:ms,x=gx:px,y=gy:px' --screen 1920x1080 --lost -1
     """
     from shift_runtime.rest_client import RestClient
     from shift_schemas.errors import MalformedMessage, check_id
-    from shift_sources.files.formats import read_samples
+    from shift_sources.files.formats import read_gaze
+    from shift_sources.files.options import Options, aoi_map_of, lost_of, millimetres_of, origin_of, time_unit_of
 
     if source is not None:
         check_id("--source", source)
-    found = list(read_samples(file, _screen(screen), format_))
-    if not found:
+    options = Options(
+        screen=_screen(screen), screen_mm=millimetres_of(screen_mm), distance_mm=distance_mm, origin=origin_of(origin),
+        time_unit=time_unit_of(time_unit), named=aoi, aoi_map=aoi_map_of(aoi_map or ()), recording=recording,
+        columns=columns, lost=lost_of(lost),
+    )  # fmt: skip
+    found = read_gaze(file, options, format_)
+    if not found.samples:
         raise MalformedMessage(f"{file.name} holds no samples")
+    if not markers:
+        found = found._replace(markers=[])
     with RestClient(url) as shift:
+        if found.named:
+            check_names(found, shift.config(session), file.name)
         before = shift.observation(session)["gaze"]
-        warnings = _stream(shift, session, found, source or _source_of(file), file.name, speed)
+        warnings = stream(shift, session, found, source or _source_of(file), file.name, speed)
         after = shift.observation(session)["gaze"]
-    said = describe(found)
-    typer.echo(f"{said.sentence}, into session {session}", err=True)
+    said = describe(found.samples, found.named)
+    typer.echo(f"{said.sentence}{_markers(len(found.markers))}, into session {session}", err=True)
     for warning in warnings:
         typer.echo(f"warning: {warning}", err=True)
-    if why := _nothing_counted(said, before, after):
+    if why := nothing_counted(said, found.named, before, after):
         typer.echo(f"nothing of this gaze counted: {why}", err=True)
         raise typer.Exit(1)
 
@@ -97,13 +140,13 @@ def formats(
         typer.echo(json.dumps({"formats": ABOUT}, ensure_ascii=False))
         return
     for name, about in ABOUT.items():
-        typer.echo(f"{name:14} {about}")
+        typer.echo(f"{name:16} {about}")
 
 
 def _screen(text: str) -> ScreenSize | None:
     """Return the size of ``--screen``. Raise :class:`InvalidSettings` for a text that is not one."""
     from shift_schemas.errors import InvalidSettings
-    from shift_sources.files.table import ScreenSize
+    from shift_sources.files.options import ScreenSize
 
     if not text:
         return None
@@ -113,64 +156,8 @@ def _screen(text: str) -> ScreenSize | None:
     return ScreenSize(*size)
 
 
-class Described(NamedTuple):
-    """A description of a recording; shares are of its samples, 0..1."""
-
-    rate_hz: float
-    length_s: float
-    lost: float
-    off_stimulus: float
-    sentence: str
-
-
-def describe(found: Sequence[Sample]) -> Described:
-    """Return rate, length and shares of a recording's samples, and a sentence about them."""
-    length_s = found[-1].t - found[0].t
-    rate_hz = (len(found) - 1) / length_s if length_s > 0 else 0.0
-    points = [(s.x, s.y) for s in found if s.valid and s.x is not None and s.y is not None]
-    off = sum(not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0) for x, y in points)
-    lost, off_stimulus = 1 - len(points) / len(found), off / len(found)
-    sentence = (
-        f"{len(found)} samples at {rate_hz:.4g} Hz, {length_s:.1f} s of gaze, lost {lost:.1%}, "
-        f"off the stimulus {off_stimulus:.1%}"
-    )
-    return Described(rate_hz, length_s, lost, off_stimulus, sentence)
-
-
-def _stream(
-    shift: RestClient, session: str, found: list[Sample], source: str, name: str, speed: float
-) -> list[str]:  # fmt: skip
-    """Send each sample at its time; return the warnings of the last answer and of restarts."""
-    from rich.console import Console
-    from rich.progress import Progress
-    from shift_sources.files.samples import chunks
-
-    length_s = found[-1].t - found[0].t
-    per_chunk = max(1, round(len(found) / max(length_s, 1e-9) * PIECE_S * speed))
-    answer: dict[str, Any] = {}
-    begun_anew: list[str] = []
-    with Progress(console=Console(stderr=True)) as progress:
-        bar = progress.add_task(f"{name} at {speed:g}x", total=len(found))
-        begun = time.monotonic()
-        for chunk in chunks(found, per_chunk, source):
-            time.sleep(max(0.0, begun + (chunk.t[-1] - found[0].t) / speed - time.monotonic()))
-            answer = shift.gaze(session, chunk)
-            begun_anew += [w for w in answer.get("warnings", ()) if "segment" in w]
-            progress.advance(bar, len(chunk.t))
-    return list(dict.fromkeys([*begun_anew, *answer.get("warnings", ())]))
-
-
-def _nothing_counted(said: Described, before: dict[str, Any], after: dict[str, Any]) -> str:
-    """Return why the gaze had no dwell on an AOI; empty if it had some, or if the session does not say."""
-    if said.lost == 1.0:
-        return "every sample is lost"
-    if said.lost + said.off_stimulus == 1.0:
-        return "every sample is lost or off the stimulus; check the file's units"
-    if after.get("dwell_s") is None or after["dwell_s"] > before["dwell_s"]:
-        return ""
-    if after["samples"] == before["samples"]:
-        return "the session had all of it already, under this source; give another --source to play it once more"
-    return "no fixation of it fell on an AOI; check the study's AOIs, the rate and the share that is lost"
+def _markers(n: int) -> str:
+    return f", {n} marker{'s' if n > 1 else ''}" if n else ""
 
 
 def _source_of(file: Path) -> str:

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shift_schemas.errors import InvalidSettings, MalformedMessage
 from shift_sources.files.formats import ABOUT, FORMATS, read_samples
+from shift_sources.files.options import ScreenSize
 from shift_sources.files.samples import Sample
-from shift_sources.files.table import ScreenSize
 
 SCREEN = ScreenSize(2000, 1000)
 
@@ -156,7 +156,43 @@ def tobii_table(samples: list[tuple[float, float] | None]) -> str:
     return "Recording timestamp [ms]\tSensor\tGaze point X [DACS px]\tGaze point Y [DACS px]\n" + "\n".join(rows) + "\n"
 
 
-@pytest.mark.parametrize("table", [pupil_table, neon_table, tobii_table])
+def tobii_eyes_table(samples: list[tuple[float, float] | None]) -> str:
+    cells = ["\t\t\t" if p is None else "\t".join([repr(v) for v in (p[0] * 2000, p[1] * 1000)] * 2) for p in samples]
+    head = [f"GazePoint{eye}{axis} (ADCSpx)" for eye in ("Left", "Right") for axis in "XY"]
+    return (
+        "\n".join(["\t".join(["RecordingTimestamp", *head]), *(f"{i * 10}\t{c}" for i, c in enumerate(cells))]) + "\n"
+    )
+
+
+def pupil_surface_table(samples: list[tuple[float, float] | None]) -> str:
+    rows = [
+        f"{i / 100!r},{p[0] if p else 0!r},{1 - p[1] if p else 0!r},{p is not None},1.0" for i, p in enumerate(samples)
+    ]
+    return "\n".join(["gaze_timestamp,x_norm,y_norm,on_srf,confidence", *rows]) + "\n"
+
+
+def neon_surface_table(samples: list[tuple[float, float] | None]) -> str:
+    rows = [
+        f"{10**18 + i * 10**7},{p is not None},{p[0] if p else ''!r},{p[1] if p else ''!r}"
+        for i, p in enumerate(samples)
+    ]
+    head = "timestamp [ns],gaze detected on surface,gaze position on surface x [normalized],gaze position on surface y [normalized]"
+    return "\n".join([head, *rows]).replace("''", "") + "\n"
+
+
+def gazepoint_table(samples: list[tuple[float, float] | None]) -> str:
+    rows = [
+        f"{i / 100!r},{p[0] if p else 0!r},{p[1] if p else 0!r},{int(p is not None)}," for i, p in enumerate(samples)
+    ]
+    return "\n".join(["TIME(2024/05/01 10:00:00.123),BPOGX,BPOGY,BPOGV,", *rows]) + "\n"
+
+
+TABLES = [
+    pupil_table, neon_table, tobii_table, tobii_eyes_table, pupil_surface_table, neon_surface_table, gazepoint_table,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("table", TABLES)
 @given(samples=points)
 def test_what_is_written_is_read_back(table: Any, samples: list[tuple[float, float] | None]) -> None:
     with TemporaryDirectory() as folder:

@@ -37,11 +37,60 @@ class Sample(NamedTuple):
     aoi: str | None = None
 
 
-def sample_of_eyes(t: float, points: Sequence[tuple[float, float]]) -> Sample:
+class Marker(NamedTuple):
+    """A message that the tracker recorded, at ``t`` seconds since the first sample; before it, ``t`` is negative."""
+
+    t: float
+    text: str
+
+
+class Gaze(NamedTuple):
+    """A gaze file that was recognised."""
+
+    items: Iterator[Sample | Marker]
+    """In order of time."""
+    named: bool = False
+    """Whether the samples are AOI names and not points."""
+
+
+def sample_of_eyes(t: float, points: Sequence[tuple[float, float]], eyes: Eyes = NO_EYES) -> Sample:
     """Return the mean of the points of the valid eyes; without a valid eye, the sample is lost."""
     if not points:
-        return Sample(t, None, None, False)
-    return Sample(t, sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points), True)
+        return Sample(t, None, None, False, eyes)
+    return Sample(t, sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points), True, eyes)
+
+
+def lost_sample(t: float, eyes: Eyes = NO_EYES) -> Sample:
+    """Return a sample without gaze."""
+    return Sample(t, None, None, False, eyes)
+
+
+def named_sample(t: float, aoi: str | None, tracked: bool = True, eyes: Eyes = NO_EYES) -> Sample:
+    """Return a sample of AOI names. ``tracked`` is false where the gaze was lost."""
+    return Sample(t, None, None, tracked, eyes, aoi if tracked else None)
+
+
+def since_first(events: Iterable[tuple[float, Sample | str]], ticks: float) -> Iterator[Sample | Marker]:
+    """Yield samples and messages with the time since the first sample, in seconds.
+
+    Parameters
+    ----------
+    events
+        Samples, whose own time is not used, and texts of messages, each with the tracker's time.
+    ticks
+        Units of the tracker's time in a second.
+    """
+    first: float | None = None
+    early: list[tuple[float, str]] = []
+    for time, what in events:
+        if first is None and isinstance(what, str):
+            early.append((time, what))
+            continue
+        if first is None:
+            first = time
+            yield from (Marker((t - time) / ticks, text) for t, text in early)
+        t = (time - first) / ticks
+        yield Marker(t, what) if isinstance(what, str) else what._replace(t=t)
 
 
 def chunks(samples: Iterable[Sample], n: int, source: str = "file", named: bool = False) -> Iterator[GazeChunk]:

@@ -1,45 +1,44 @@
-"""Tables with a header line and columns separated by tabs or commas, plain or gzip, read line by line.
+"""Tables with a header line and columns separated by tabs, commas or semicolons, read line by line.
 
-A format declares its columns as a :class:`TableFormat`. Plain text, gzip and UTF-16 are recognised by content, not by
-the file's name.
+A format declares its columns as a :class:`TableFormat`.
 """
 
 from __future__ import annotations
 
 import csv
-import gzip
 import math
-import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import IO
 
-from shift_schemas.errors import FieldError, InvalidSettings, MalformedMessage, shorten
+from shift_schemas.errors import InvalidSettings, MalformedMessage
 
-from shift_sources.files.samples import Sample
+from shift_sources.files.options import Options, ScreenSize
+from shift_sources.files.samples import Gaze, Sample
+from shift_sources.files.text_file import TextFile, mistake
 
-GZIP_MAGIC = b"\x1f\x8b"
-LONGEST_LINE = 65_536
-"""Chosen: characters; a row of a TX300 has 200."""
 MICROSECONDS = 1_000_000
+LONGEST_TIME = 20
+"""Digits of a whole time; nanoseconds since 1970 have 19."""
 SEPARATORS = ("\t", ",", ";")
-UTF_16 = (b"\xff\xfe", b"\xfe\xff")
-"""The byte order marks of UTF-16."""
+
+
+class Header:
+    """The names of a table's columns with their positions; of two columns with one name, the first one counts."""
+
+    def __init__(self, names: list[str]) -> None:
+        self.width = len(names)
+        self.columns = {name: i for i, name in reversed(list(enumerate(names)))}
 
 
 class Row:
     """One row of a table, with its place in the file for error messages."""
 
-    def __init__(
-        self, file: str, line: int, columns: dict[str, int], cells: list[str], decimal_comma: bool = False
-    ) -> None:
-        self.file, self.line, self.columns, self.cells = file, line, columns, cells
+    def __init__(self, file: str, line: int, header: Header, cells: list[str], decimal_comma: bool = False) -> None:
+        self.file, self.line, self.columns, self.cells = file, line, header.columns, cells
         self.decimal_comma = decimal_comma
-        if len(cells) != len(columns):
-            rule = f"as many cells as the header has, {len(columns)}; columns are separated as in the header"
-            raise _mistake(file, line, "row", f"{len(cells)} cells", rule)
+        if len(cells) != header.width:
+            rule = f"as many cells as the header has, {header.width}; columns are separated as in the header"
+            raise mistake(file, line, "row", f"{len(cells)} cells", rule)
 
     def text(self, column: str) -> str:
         """Return the text of the cell."""
@@ -60,14 +59,29 @@ class Row:
             raise self.wrong(column, "a finite number, or nothing where it was lost")
         return value
 
+    def size(self, column: str) -> float | None:
+        """Return a pupil's size; None if it is lost, as a size of 0 or less is, or if there is no such column."""
+        value = self.number(column) if column in self.columns else None
+        return value if value is not None and value > 0 else None
+
+    def openness(self, column: str) -> float | None:
+        """Return an eye's openness, of which 0 is a closed eye; None as in :meth:`size`, but below 0."""
+        value = self.number(column) if column in self.columns else None
+        return value if value is not None and value >= 0 else None
+
     def ticks(self, column: str) -> float | None:
         """Return a time as :meth:`number` does. A whole number keeps all of its digits."""
         text = self.text(column)
-        return int(text) if text.isdecimal() and text.isascii() else self.number(column)
+        whole = text.isdecimal() and text.isascii() and len(text) <= LONGEST_TIME
+        return int(text) if whole else self.number(column)
 
     def wrong(self, column: str, rule: str) -> MalformedMessage:
         """Return the error that this cell does not follow ``rule``."""
-        return _mistake(self.file, self.line, column, self.text(column), rule)
+        return self.wrong_place(column, self.text(column), rule)
+
+    def wrong_place(self, field: str, value: str, rule: str) -> MalformedMessage:
+        """Return the error that something else of this row does not follow ``rule``."""
+        return mistake(self.file, self.line, field, value, rule)
 
 
 @dataclass(frozen=True)
@@ -90,58 +104,78 @@ class TableFormat:
     """Whether numbers can have a decimal comma, as the program writes them on a computer of some countries."""
     pixels: bool = False
     """Whether positions are in pixels of the screen, whose size must be given."""
+    named: bool = False
+    """Whether the samples are AOI names and not points."""
+    taken: Callable[[Row], bool] | None = None
+    """Returns whether a row belongs to the recording that is read; None: all rows do."""
 
 
-@dataclass(frozen=True)
-class ScreenSize:
-    """The size of the screen, or of the scene camera's picture, in pixels."""
-
-    width: int
-    height: int
+Recogniser = Callable[[list[str], Options], TableFormat | None]
+"""Returns the format of a table with this header, or None."""
+Reader = Callable[[TextFile, Options], Gaze | None]
+"""Returns the gaze of a file, or None if the file does not have the reader's format."""
 
 
-Recogniser = Callable[[list[str], ScreenSize | None], TableFormat | None]
-"""Returns the format of a table with this header, or None. Without a size, positions in pixels cannot be converted."""
+def is_table(table: TableFormat) -> Reader:
+    """Return the reader of a format whose header is always the same."""
+    return table_reader(lambda header, options: table if set(table.columns) <= set(header) else None)
 
 
-def is_table(table: TableFormat) -> Recogniser:
-    """Return the recogniser of a format whose header is always the same."""
-    return lambda header, screen: table if set(table.columns) <= set(header) else None
+def table_reader(recognise: Recogniser) -> Reader:
+    """Return the reader of a table whose first line is its header.
 
-
-def read_table(
-    path: Path, formats: Mapping[str, Sequence[Recogniser]], screen: ScreenSize | None = None
-) -> Iterator[Sample]:
-    """Yield the samples of a table of one of the ``formats``; the first one that fits the header is used.
-
-    Raises
-    ------
-    InvalidSettings
-        The file cannot be opened, or its positions are in pixels and ``screen`` is not given.
-    MalformedMessage
-        The file is not such a table. The message names the file, the line, the value and the rule; it is raised when
-        that line is reached.
+    The reader raises :class:`InvalidSettings` if the command line must say something and does not, and
+    :class:`MalformedMessage`, when that line is reached, for a mistake in the table. The message names the file, the
+    line, the column, the value and the rule.
     """
-    with _opened(path) as lines:
-        header, table = _recognised(lines.readline(LONGEST_LINE), formats, screen, path.name)
-        if table.pixels and screen is None:
-            raise InvalidSettings(
-                f"{path.name} ({table.name}) has positions in pixels: give the size of the screen, or of the scene "
-                "camera's picture, with --screen, such as --screen 1920x1080"
-            )
-        columns = {column: i for i, column in enumerate(header)}
-        yield from _samples(lines, table, columns, path.name)
+
+    def read(file: TextFile, options: Options) -> Gaze | None:
+        first = file.head[0] if file.head else ""
+        for separator in SEPARATORS:
+            header = cells_of(first, separator)
+            table = recognise(header, options)
+            if table is not None and table.separator == separator:
+                return gaze_of_table(file, table, header, options)
+        return None
+
+    return read
 
 
-def _samples(lines: IO[str], table: TableFormat, columns: dict[str, int], name: str) -> Iterator[Sample]:
+def gaze_of_table(file: TextFile, table: TableFormat, header: list[str], options: Options, line: int = 1) -> Gaze:
+    """Return the gaze of a table whose header is at this line. Raise :class:`InvalidSettings` as the reader does."""
+    if table.pixels and options.screen is None:
+        raise InvalidSettings(
+            f"{file.name} ({table.name}) has positions in pixels: give the size of the screen, or of the scene "
+            "camera's picture, with --screen, such as --screen 1920x1080"
+        )
+    if not table.named:
+        refuse_names(file.name, table.name, options)
+    return Gaze(_samples(file, table, Header(header), line), table.named)
+
+
+def refuse_names(file: str, format_: str, options: Options) -> None:
+    """Raise :class:`InvalidSettings` if AOI names are asked for, of a file that has none."""
+    if options.named:
+        raise InvalidSettings(f"{file} ({format_}) has no AOI names; leave --aoi out to take its points")
+
+
+def check_screen(file: str, said: ScreenSize, options: Options) -> None:
+    """Raise :class:`InvalidSettings` if the command line gives another size than the file."""
+    if options.screen not in (None, said):
+        raise InvalidSettings(
+            f"{file} says that its screen has {said} pixels, and --screen says {options.screen}: leave --screen out"
+        )
+
+
+def _samples(file: TextFile, table: TableFormat, header: Header, header_line: int) -> Iterator[Sample]:
     first: float | None = None
     before = -math.inf
-    number = 1
-    while line := lines.readline(LONGEST_LINE):
-        number += 1
-        if not line.strip():
+    for number, line in file.lines():
+        if number <= header_line or not line.strip():
             continue
-        row = Row(name, number, columns, cells_of(line, table.separator), table.decimal_comma)
+        row = Row(file.name, number, header, cells_of(line, table.separator), table.decimal_comma)
+        if table.taken is not None and not table.taken(row):
+            continue
         time = row.ticks(table.time_column)
         if time is None or (time <= before and not table.repeats):
             raise row.wrong(table.time_column, "the tracker's clock, rising from row to row")
@@ -153,48 +187,7 @@ def _samples(lines: IO[str], table: TableFormat, columns: dict[str, int], name: 
             yield sample
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[IO[str]]:
-    """Open plain text or gzip; report what is wrong with the file in a sentence."""
-    try:
-        with path.open("rb") as file:
-            start = file.read(2)
-        encoding = "utf-16" if start in UTF_16 else "utf-8-sig"
-        with (
-            gzip.open(path, "rt", encoding="utf-8-sig")
-            if start == GZIP_MAGIC
-            else path.open(encoding=encoding) as lines
-        ):
-            yield lines
-    except UnicodeError as e:
-        raise MalformedMessage(f"{path.name}: this is not text in UTF-8 or UTF-16; give a table or its gzip") from e
-    except (EOFError, gzip.BadGzipFile, zlib.error) as e:
-        raise MalformedMessage(f"{path.name}: the gzip file is damaged or cut off: {e}") from e
-    except OSError as e:
-        raise InvalidSettings(f"{path.name} cannot be read: {e.strerror or e}") from e
-
-
-def _recognised(
-    line: str, formats: Mapping[str, Sequence[Recogniser]], screen: ScreenSize | None, name: str
-) -> tuple[list[str], TableFormat]:
-    """Return the names of the columns and the format. Raise :class:`MalformedMessage` if none fits."""
-    for recognisers in formats.values():
-        for recogniser in recognisers:
-            for separator in SEPARATORS:
-                header = cells_of(line, separator)
-                table = recogniser(header, screen)
-                if table is not None and table.separator == separator:
-                    return header, table
-    rule = f"the header of one of these tables: {', '.join(formats)}; shift-mesh gaze formats lists their columns"
-    raise _mistake(name, 1, "header", line.strip(), rule)
-
-
 def cells_of(line: str, separator: str) -> list[str]:
     """Return the cells of a line; a cell in quotes may contain the separator."""
     line = line.rstrip("\r\n")
     return next(csv.reader([line], delimiter=separator), []) if '"' in line else line.split(separator)
-
-
-def _mistake(file: str, line: int, field: str, value: str, rule: str) -> MalformedMessage:
-    error = FieldError(field=field, value=shorten(value), rule=rule)
-    return MalformedMessage(f"{file}:{line}: {field}: {error.value!r} is not valid: {rule}", (error,))
