@@ -12,7 +12,7 @@ from shift_recording.gaze_quality import GazeQuality, SourceQuality
 from shift_recording.mcap.reader import Recording
 from shift_recording.parallel import for_each
 from shift_schemas.errors import ShiftError
-from shift_schemas.messages import Gaze, Session
+from shift_schemas.messages import Clock, Gaze, Session
 
 from shift_verify.verify import VerifyReport, verify
 
@@ -30,6 +30,8 @@ class RecordingReport:
     format: int = 0
     software: str = ""
     gaze: tuple[SourceQuality, ...] = ()
+    clocks: tuple[Clock, ...] = ()
+    """The last ledger of each gaze source; none is recorded before format 5."""
 
     def as_json(self) -> dict[str, Any]:
         """Return the report as ``--json`` prints it."""
@@ -37,27 +39,30 @@ class RecordingReport:
             **self.verified.as_json(), "sha256": self.sha256, "session": self.session, "participant": self.participant,
             "study": self.study, "condition": self.condition, "format": self.format, "software": self.software,
             "gaze": [source.as_json() for source in self.gaze],
+            "clocks": [clock.model_dump(mode="json", exclude={"session", "stamp", "seen"}) for clock in self.clocks],
         }  # fmt: skip
 
 
 def report_on(path: Path, on_progress: Callable[[int, int], None] | None = None) -> RecordingReport:
     """Verify one recording, and describe it as far as it can be read. Raises :class:`UnknownThing`."""
     verified, digest = verify(path, on_progress), sha256_of(path)
-    quality, session = GazeQuality(), None
+    quality, session, clocks = GazeQuality(), None, dict[str, Clock]()
     try:
-        for recorded in Recording(path).facts(("session", "gaze")):
+        for recorded in Recording(path).facts(("session", "gaze", "clock")):
             if isinstance(recorded.fact, Session):
                 session = session or recorded.fact
             elif isinstance(recorded.fact, Gaze):
                 quality.add(recorded.fact)
+            elif isinstance(recorded.fact, Clock):
+                clocks[recorded.fact.source] = recorded.fact
     except ShiftError:
         pass  # the report has it
-    gaze = tuple(quality.sources())
+    gaze, ledgers = tuple(quality.sources()), tuple(clocks.values())
     if session is None:
-        return RecordingReport(verified, digest, gaze=gaze)
+        return RecordingReport(verified, digest, gaze=gaze, clocks=ledgers)
     return RecordingReport(
         verified, digest, session.session, session.participant, session.study, session.condition or "",
-        session.format, session.software, gaze,
+        session.format, session.software, gaze, ledgers,
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from shift_recording.gaze_quality import SourceQuality
+from shift_schemas.messages import Clock
 
 from shift_verify.many import RecordingReport
 
@@ -23,6 +24,10 @@ GAZE_COLUMNS = ("recording", "source", "samples", "rate", "lost", "on AOIs", "ga
                 "late / missing chunks", "clock")  # fmt: skip
 
 
+CLOCK_COLUMNS = ("recording", "source", "repeated", "refused", "segments", "the clock was set by", "offset", "drift",
+                 "round trip")  # fmt: skip
+
+
 def supplement(reports: Sequence[RecordingReport], version: str) -> str:
     """Return the report as Markdown."""
     verified = [report.verified for report in reports]
@@ -34,6 +39,8 @@ def supplement(reports: Sequence[RecordingReport], version: str) -> str:
     gaze = [(report.verified.file, source) for report in reports for source in report.gaze]
     parts = [head, "## Recordings\n", _table(COLUMNS, [_recording_row(report) for report in reports])]
     parts += ["## Gaze\n", _table(GAZE_COLUMNS, [_gaze_row(*each) for each in gaze])] if gaze else []
+    clocks = [(report.verified.file, clock) for report in reports for clock in report.clocks]
+    parts += ["## Clocks\n", _table(CLOCK_COLUMNS, [_clock_row(*each) for each in clocks])] if clocks else []
     digests = [(report.verified.file, f"`{report.sha256}`") for report in reports]
     return "\n".join([*parts, "## SHA-256\n", _table(("recording", "checksum"), digests)])
 
@@ -58,6 +65,15 @@ def _gaze_row(file: str, gaze: SourceQuality) -> tuple[str, ...]:
         str(gaze.gaps), f"{gaze.longest_gap_s:.2f} s", str(gaze.segments - 1),
         f"{gaze.late_chunks} / {gaze.missing_chunks}", clock,
     )  # fmt: skip
+
+
+def _clock_row(file: str, clock: Clock) -> tuple[str, ...]:
+    refused = ", ".join(f"{count} {kind}" for kind, count in clock.refused.items()) or "0"
+    steps = ", ".join(f"{segment.step_s:+.3f} s" for segment in (clock.segments or [])[1:]) or "-"
+    offset = "-" if clock.offset_s is None else f"{clock.offset_s:.3f} s"
+    drift = "-" if clock.drift_ppm is None else f"{clock.drift_ppm:+.0f} ppm"
+    trip = "-" if clock.round_trip_s is None else f"{1000 * clock.round_trip_s:.1f} ms"
+    return file, clock.source, str(clock.repeated), refused, str(clock.restarts + 1), steps, offset, drift, trip
 
 
 def _number(value: float | None, unit: str) -> str:
