@@ -21,6 +21,7 @@ from shift_schemas.messages import AoiPositions, Decision, Fact
 from shift_schemas.requests import MarkerBody, StartBody
 from shift_sources.gaze_batching import MOST_SOURCES, GazeArrival
 from shift_sources.gaze_forwarder import Batching, GazeForwarder
+from shift_sources.gaze_sink import MeshSink
 
 from shift_ros2 import mapping
 from shift_ros2.backend import Answer, Backend
@@ -161,7 +162,7 @@ class Bridge:
                 raise Unavailable(f"gaze of {SESSIONS} sessions waits already; there is no room for another")
             self._forwarders.pop(idle).close()
         batching = Batching(self.settings.gaze_chunk, self.settings.gaze_wait_s)
-        forwarder = GazeForwarder(self.mesh, session, batching, self._attach, self._gaze_lost)
+        forwarder = GazeForwarder(MeshSink(self.mesh), session, batching, self._attach, self._gaze_lost)
         self._forwarders[session] = forwarder
         return forwarder
 

@@ -16,6 +16,8 @@ from shift_schemas.messages.monitor import EYE_COLUMNS
 
 COLUMNS = ("t", "x", "y", "valid", "aoi", *EYE_COLUMNS)
 """The fields of a chunk that hold one value for each sample."""
+RESTART_S = 1.0
+"""Chosen: samples that overtake each other differ by less."""
 MOST_SOURCES = 256
 """How many sources are remembered. The monitor still compares the times of an older source; this module does not."""
 
@@ -41,10 +43,14 @@ class GazeBuffer:
         return bool(self._waiting)
 
     def add(self, arrival: GazeArrival) -> None:
-        """Add an arrival. Raise :class:`MalformedMessage` if its time does not rise: it would spoil its chunk."""
+        """Add an arrival.
+
+        A time that goes back by :data:`RESTART_S` or more is a clock that began anew: the arrival begins a chunk, and
+        the monitor begins a segment. A smaller step back raises :class:`MalformedMessage`: it would spoil its chunk.
+        """
         t, source = arrival.chunk.t, arrival.chunk.source
         last = self._last_t.get(source)
-        if not arrival.numbered and last is not None and t[0] <= last:
+        if not arrival.numbered and last is not None and last - RESTART_S < t[0] <= last:
             rule = f"t must rise; the sample before was at {last} s, {source}'s clock"
             raise MalformedMessage(f"gaze: t: {rule}", (FieldError(field="t", value=shorten(t[0]), rule=rule),))
         self._last_t[source] = t[-1]
@@ -53,6 +59,14 @@ class GazeBuffer:
             self._last_t.popitem(last=False)
         self.samples += len(t)
         self._waiting.append(arrival)
+
+    def drop_oldest(self, most: int) -> list[GazeArrival]:
+        """Remove the oldest arrivals until ``most`` samples wait, and return them."""
+        dropped = []
+        while self._waiting and self.samples > most:
+            dropped.append(self._waiting.popleft())
+            self.samples -= len(dropped[-1].chunk.t)
+        return dropped
 
     def is_ready(self, samples: int) -> bool:
         """Return whether to send now: the first arrival has a number, or ``samples`` samples wait."""
@@ -65,7 +79,7 @@ class GazeBuffer:
         """
         taken = [self._waiting.popleft()]
         count = len(taken[0].chunk.t)
-        while not taken[0].numbered and self._waiting and _can_join(taken[0], self._waiting[0]):
+        while not taken[0].numbered and self._waiting and _can_join(taken[-1], self._waiting[0]):
             count += len(self._waiting[0].chunk.t)
             if count > limit:
                 break
@@ -89,5 +103,5 @@ def join(arrivals: list[GazeArrival], seq: int) -> GazeChunk:
 
 
 def _can_join(a: GazeArrival, b: GazeArrival) -> bool:
-    same = a.chunk.source == b.chunk.source and not b.numbered
+    same = a.chunk.source == b.chunk.source and not b.numbered and a.chunk.t[-1] < b.chunk.t[0]
     return same and all((getattr(a.chunk, n) is None) == (getattr(b.chunk, n) is None) for n in COLUMNS)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import structlog
 from shift_runtime.deadline import Deadline
-from shift_runtime.mesh_api import MeshApi
 from shift_schemas.errors import MalformedMessage, ShiftError, Unavailable
 
 from shift_sources.completion import Completion
 from shift_sources.gaze_batching import MOST_SOURCES, GazeArrival, GazeBuffer, join
+from shift_sources.gaze_sink import GazeSink
 
 log = structlog.get_logger()
 BACKLOG_CHUNK = 500
@@ -32,13 +32,15 @@ class Batching:
     """The size of a chunk, in samples."""
     wait_s: float
     """How long samples wait for a chunk to fill, in seconds."""
+    most: int = 20_000
+    """The most samples that wait: ten seconds at 2000 Hz. Beyond it the oldest are dropped and counted."""
 
 
 class GazeForwarder:
     """The buffer of one session and the task that empties it."""
 
-    def __init__(self, mesh: MeshApi, session: str, batching: Batching, attach: Attach, on_lost: OnLost) -> None:
-        self._mesh = mesh
+    def __init__(self, sink: GazeSink, session: str, batching: Batching, attach: Attach, on_lost: OnLost) -> None:
+        self._sink = sink
         self._session = session
         self._batching = batching
         self._attach = attach
@@ -49,15 +51,30 @@ class GazeForwarder:
         self._ready = asyncio.Event()
         self._flushing = False
         self._next_seq: OrderedDict[str, int] = OrderedDict()
+        self._gaps: set[str] = set()
+        """Sources whose next chunk leaves out a number, because samples before it were dropped."""
         self._task = asyncio.get_running_loop().create_task(self._run())
 
     def put(self, arrival: GazeArrival) -> None:
-        """Add an arrival to the queue. Raise :class:`MalformedMessage` if its time does not rise."""
+        """Add an arrival to the queue. Raise :class:`MalformedMessage` if its time does not rise.
+
+        If too many samples wait, the oldest are dropped, and the next chunk leaves out a number, so that the recording
+        says that something is missing.
+        """
         self._buffer.add(arrival)
         self._completion.receive()
+        if self._buffer.samples > self._batching.most:
+            self._drop_oldest()
         self._wake.set()
         if self._buffer.is_ready(self._batching.samples):
             self._ready.set()
+
+    def _drop_oldest(self) -> None:
+        dropped = self._buffer.drop_oldest(self._batching.most)
+        self._completion.finish(len(dropped))
+        self._gaps |= {arrival.chunk.source for arrival in dropped if not arrival.numbered}
+        error = Unavailable("the mesh does not take gaze as fast as it comes; the oldest samples were dropped")
+        self._on_lost("gaze", error, sum(len(arrival.chunk.t) for arrival in dropped))
 
     @property
     def idle(self) -> bool:
@@ -123,18 +140,13 @@ class GazeForwarder:
         else:
             source = taken[0].chunk.source
             if source not in self._next_seq:
-                self._next_seq[source] = await self._first_seq(source)
+                self._next_seq[source] = await self._sink.next_seq(self._session, source)
+            if source in self._gaps:
+                self._gaps.discard(source)
+                self._next_seq[source] += 1
             chunk = join(taken, self._next_seq[source])
-        await self._mesh.gaze(self._session, chunk)
+        await self._sink.gaze(self._session, chunk)
         self._next_seq[chunk.source] = chunk.seq + 1
         self._next_seq.move_to_end(chunk.source)
         if len(self._next_seq) > MOST_SOURCES:
             self._next_seq.popitem(last=False)
-
-    async def _first_seq(self, source: str) -> int:
-        """Return the number that follows the source's last chunk, which another process may have sent."""
-        read_model = self._mesh.read_model
-        view = await read_model.view(self._session)
-        if not await read_model.reader.pull("monitor"):
-            raise Unavailable("the monitor does not answer, so the last number of this gaze source is not known")
-        return view.observation.seen.gaze.get(source, -1) + 1 if view.observation else 0

@@ -1,0 +1,1 @@
+"""Live sources of gaze: Lab Streaming Layer, Pupil Labs."""
