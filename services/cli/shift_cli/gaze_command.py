@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from shift_cli.gaze_playing import check_names, describe, nothing_counted, stream
-from shift_cli.screen_option import pixels_of
+from shift_cli.screen_option import screen_size
 
 if TYPE_CHECKING:
-    from shift_sources.files.options import ScreenSize
+    pass
 
 app = typer.Typer(no_args_is_help=True, help="Gaze recordings.")
 FILE_OPTIONS = "What the file does not say"
@@ -98,9 +98,9 @@ def play(
     if source is not None:
         check_id("--source", source)
     options = Options(
-        screen=_screen(screen), screen_mm=millimetres_of(screen_mm), distance_mm=distance_mm, origin=origin_of(origin),
-        time_unit=time_unit_of(time_unit), named=aoi, aoi_map=aoi_map_of(aoi_map or ()), recording=recording,
-        columns=columns, lost=lost_of(lost),
+        screen=screen_size(screen), screen_mm=millimetres_of(screen_mm), distance_mm=distance_mm,
+        origin=origin_of(origin), time_unit=time_unit_of(time_unit), named=aoi, aoi_map=aoi_map_of(aoi_map or ()),
+        recording=recording, columns=columns, lost=lost_of(lost),
     )  # fmt: skip
     found = read_gaze(file, options, format_)
     if not found.samples:
@@ -141,19 +141,6 @@ def formats(
         return
     for name, about in ABOUT.items():
         typer.echo(f"{name:16} {about}")
-
-
-def _screen(text: str) -> ScreenSize | None:
-    """Return the size of ``--screen``. Raise :class:`InvalidSettings` for a text that is not one."""
-    from shift_schemas.errors import InvalidSettings
-    from shift_sources.files.options import ScreenSize
-
-    if not text:
-        return None
-    size = pixels_of(text)
-    if size is None:
-        raise InvalidSettings(f"--screen is {text!r}: write width and height in pixels, such as 1920x1080")
-    return ScreenSize(*size)
 
 
 def _markers(n: int) -> str:

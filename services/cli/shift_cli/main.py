@@ -25,6 +25,7 @@ from shift_cli import (
     ros1_command,
     ros2_command,
     simulate_command,
+    source_command,
     study_command,
     verify_command,
     whatif_command,
@@ -127,6 +128,7 @@ app.command("replay")(replay_command.replay)
 app.command("ros1", context_settings=ros2_command.CONTEXT)(ros1_command.ros1)
 app.command("ros2", context_settings=ros2_command.CONTEXT)(ros2_command.ros2)
 app.add_typer(gaze_command.app, name="gaze")
+app.add_typer(source_command.app, name="source")
 app.add_typer(study_command.app, name="study")
 app.add_typer(evaluate_commands.app, name="evaluate")
 

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from shift_sources.files.options import ScreenSize
 
 
 def pixels_of(text: str) -> tuple[int, int] | None:
@@ -11,3 +15,16 @@ def pixels_of(text: str) -> tuple[int, int] | None:
     if match is None or not int(match[1]) or not int(match[2]):
         return None
     return int(match[1]), int(match[2])
+
+
+def screen_size(text: str) -> ScreenSize | None:
+    """Return the size of ``--screen``, None for an empty text. Raise :class:`InvalidSettings` for another text."""
+    from shift_schemas.errors import InvalidSettings
+    from shift_sources.files.options import ScreenSize
+
+    if not text:
+        return None
+    size = pixels_of(text)
+    if size is None:
+        raise InvalidSettings(f"--screen is {text!r}: write width and height in pixels, such as 1920x1080")
+    return ScreenSize(*size)

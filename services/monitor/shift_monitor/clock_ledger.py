@@ -30,16 +30,26 @@ MOST_SEGMENTS = 32
 
 @dataclass(frozen=True, slots=True)
 class Arrivals:
-    """The arrivals of one segment: sums over its chunks, s since the first one, by both clocks."""
+    """The arrivals of one segment: sums over the seconds of the mesh's clock, in s since the first arrival.
+
+    Of each second, only the arrival counts that had the shortest way: it came the least late. The first second does not
+    count: when a connection begins, samples that waited come late.
+    """
 
     first_ns: int = 0
     first_stamp_ns: int = 0
+    chunks: int = 0
     count: int = 0
+    """Seconds that are in the sums."""
     own: float = 0.0
     mesh: float = 0.0
     own_mesh: float = 0.0
     mesh_mesh: float = 0.0
     latest_mesh: float = 0.0
+    second: int = 0
+    """The second that goes on."""
+    least: tuple[int, float, float] | None = None
+    """Its arrival with the shortest way: mesh's clock minus source's clock (ns), and the times by both clocks (s)."""
     offset_ns: int = 0
     """The smallest difference between the mesh's clock at an arrival and the source's clock."""
 
@@ -126,19 +136,20 @@ def _ended(ledger: ClockLedger) -> EndedSegment:
     )  # fmt: skip
 
 
-def jumps_forward(ledger: ClockLedger, first_ns: int, now: Stamp) -> bool:
-    """Return whether the source's clock jumped before a sample at ``first_ns`` that arrives now.
+def jumps_forward(ledger: ClockLedger, times: list[int], now: Stamp) -> bool:
+    """Return whether the source's clock jumped before or within a chunk that arrives now.
 
-    Between two chunks, the source's clock then went on by more than the mesh's clock did, at the pace of the segment
-    so far: a source that plays faster than real time has another pace.
+    Between two samples, the source's clock then went on by more than the mesh's clock did since the last chunk, at the
+    pace of the segment so far: a source that plays faster than real time has another pace.
     """
     arrivals = ledger.arrivals
-    if ledger.last_ns is None or arrivals.count < 2 or arrivals.latest_mesh < LEAST_JUMP_S:
+    if ledger.last_ns is None or arrivals.chunks < 2 or arrivals.latest_mesh < LEAST_JUMP_S:
         return False
+    gap_ns = max(map(sub, times, [ledger.last_ns, *times]))
     own = (ledger.last_ns - arrivals.first_ns) / NS
     pace = arrivals.latest_mesh / own if own > 0 else 1.0
     passed = (now.ns - arrivals.first_stamp_ns) / NS - arrivals.latest_mesh
-    return pace * (first_ns - ledger.last_ns) / NS - passed > LEAST_JUMP_S
+    return bool(pace * gap_ns / NS - passed > LEAST_JUMP_S)
 
 
 def is_due(ledger: ClockLedger, restarted: bool, now: Stamp) -> bool:
@@ -148,13 +159,28 @@ def is_due(ledger: ClockLedger, restarted: bool, now: Stamp) -> bool:
 
 def _with_arrival(before: Arrivals, own_ns: int, now: Stamp) -> Arrivals:
     offset_ns = now.ns - own_ns
-    if before.count == 0:
-        return Arrivals(own_ns, now.ns, 1, offset_ns=offset_ns)
+    if before.chunks == 0:
+        return Arrivals(own_ns, now.ns, 1, least=(offset_ns, 0.0, 0.0), offset_ns=offset_ns)
     own, mesh = (own_ns - before.first_ns) / NS, (now.ns - before.first_stamp_ns) / NS
+    count, sums, second, least = before.count, _sums(before), int(mesh), before.least
+    if second != before.second and least is not None:
+        if before.second > 0:
+            count, sums = count + 1, _added(sums, *least[1:])
+        least = None
+    if least is None or offset_ns < least[0]:
+        least = offset_ns, own, mesh
     return Arrivals(
-        before.first_ns, before.first_stamp_ns, before.count + 1, before.own + own, before.mesh + mesh,
-        before.own_mesh + own * mesh, before.mesh_mesh + mesh * mesh, mesh, min(before.offset_ns, offset_ns),
+        before.first_ns, before.first_stamp_ns, before.chunks + 1, count, *sums, mesh, second, least,
+        min(before.offset_ns, offset_ns),
     )  # fmt: skip
+
+
+def _sums(a: Arrivals) -> tuple[float, float, float, float]:
+    return a.own, a.mesh, a.own_mesh, a.mesh_mesh
+
+
+def _added(sums: tuple[float, float, float, float], own: float, mesh: float) -> tuple[float, float, float, float]:
+    return sums[0] + own, sums[1] + mesh, sums[2] + own * mesh, sums[3] + mesh * mesh
 
 
 def count_late(ledger: ClockLedger) -> ClockLedger:
@@ -183,7 +209,7 @@ def clock_fact(
         restarts=ledger.restarts,
         rate_hz=intervals * NS / ledger.span_ns if ledger.span_ns and intervals > 0 else None,
         longest_gap_s=ledger.longest_gap_ns / NS,
-        offset_s=arrivals.offset_ns / NS if arrivals.count else None,
+        offset_s=arrivals.offset_ns / NS if arrivals.chunks else None,
         drift_ppm=_drift_ppm(arrivals),
         round_trip_s=ledger.round_trip_s, source_offset_s=ledger.source_offset_s,
         segments=_segments(ledger) if with_segments else None,
@@ -211,7 +237,7 @@ def _segments(ledger: ClockLedger) -> list[ClockSegment]:
 
 
 def _drift_ppm(a: Arrivals) -> float | None:
-    """Return how much faster the source's clock runs than the mesh's: a line through the arrivals."""
+    """Return how much faster the source's clock runs than the mesh's: a line through the least late arrivals."""
     if a.count < 3 or a.latest_mesh < SHORTEST_S:
         return None
     spread = a.count * a.mesh_mesh - a.mesh**2

@@ -141,7 +141,7 @@ def _arrival(state: MonitorState, stream: GazeStream, gaze: ChunkWithHistory, ti
         return "late"  # format 1 does not look at the chunk's time
     arrival = classify_arrival(stream.numbering, seq, used, continues)
     ledger = state.ledgers.get(stream.source)
-    if arrival == "new" and state.format >= 6 and ledger is not None and jumps_forward(ledger, times[0], now):
+    if arrival == "new" and state.format >= 6 and ledger is not None and jumps_forward(ledger, times, now):
         return "restart"
     return arrival
 

@@ -103,5 +103,5 @@ def join(arrivals: list[GazeArrival], seq: int) -> GazeChunk:
 
 
 def _can_join(a: GazeArrival, b: GazeArrival) -> bool:
-    same = a.chunk.source == b.chunk.source and not b.numbered and a.chunk.t[-1] < b.chunk.t[0]
+    same = a.chunk.source == b.chunk.source and not b.numbered and 0 < b.chunk.t[0] - a.chunk.t[-1] <= RESTART_S
     return same and all((getattr(a.chunk, n) is None) == (getattr(b.chunk, n) is None) for n in COLUMNS)

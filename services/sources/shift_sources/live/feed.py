@@ -48,7 +48,7 @@ class Chunker:
     """Makes chunks of the samples of one source. Their time rises in each chunk.
 
     A sample whose time goes back by less than :data:`RESTART_S` is left out and counted: two samples overtook each
-    other, or a sample came twice. A larger step back begins a chunk.
+    other, or a sample came twice. A larger step in either direction begins a chunk, since the clock may have been set.
     """
 
     def __init__(self, source: str) -> None:
@@ -70,7 +70,7 @@ class Chunker:
             if last is not None and last - RESTART_S < sample.t <= last:
                 self.out_of_order += 1
                 continue
-            if part and last is not None and sample.t <= last:
+            if part and last is not None and not 0 < sample.t - last <= RESTART_S:
                 yield part
                 part = []
             part.append(sample)
