@@ -44,7 +44,9 @@ def _sources() -> None:
 @app.command()
 def lsl(
     session: Annotated[str, typer.Option(help="The session that gets the gaze.", envvar="SHIFT_SESSION")] = "",
-    list_: Annotated[bool, typer.Option("--list", help="List the streams there are, and end.")] = False,
+    list_: Annotated[
+        bool, typer.Option("--list", help="List the streams there are, and end.", envvar="SHIFT_LIST")
+    ] = False,
     name: Annotated[
         str, typer.Option(help="Name of the gaze stream; left out: the only one.", envvar="SHIFT_NAME")
     ] = "",
@@ -61,10 +63,16 @@ def lsl(
     aoi_map: AoiMap = None,
     screen: Screen = "",
     unit: Annotated[
-        str, typer.Option(help="Unit of the points, if the stream does not say it: normalised, pixels.")
+        str,
+        typer.Option(
+            help="Unit of the points, if the stream does not say it: normalised, pixels.", envvar="SHIFT_UNIT"
+        ),
     ] = "",
     origin: Annotated[
-        str, typer.Option(help="Where y begins, if the stream does not say it: top-left, bottom-left.")
+        str,
+        typer.Option(
+            help="Where y begins, if the stream does not say it: top-left, bottom-left.", envvar="SHIFT_ORIGIN"
+        ),
     ] = "",
     source: Source = "lsl",
     chunk: Chunk = 30,
@@ -101,7 +109,9 @@ def lsl(
 @app.command("lsl-outlet")
 def lsl_outlet(
     session: Session,
-    name: Annotated[str, typer.Option(help="Name of the stream; left out: SHIFT and the session.")] = "",
+    name: Annotated[
+        str, typer.Option(help="Name of the stream; left out: SHIFT and the session.", envvar="SHIFT_NAME")
+    ] = "",
     url: Url = URL,
 ) -> None:
     """Publish decisions, cognitive states and rewards as a marker stream of Lab Streaming Layer until Ctrl-C.
@@ -114,6 +124,72 @@ def lsl_outlet(
     from shift_sources.live.lsl_outlet import publish
 
     publish(url, session, name or f"SHIFT {session}", lambda text: typer.echo(text, err=True))
+
+
+@app.command()
+def pupil(
+    session: Session,
+    address: Annotated[
+        str, typer.Option(help="Host and port of Pupil Remote.", envvar="SHIFT_ADDRESS")
+    ] = "127.0.0.1:50020",
+    surface: Annotated[
+        str,
+        typer.Option(
+            help="Take points on this surface; left out: in the scene camera's picture.", envvar="SHIFT_SURFACE"
+        ),
+    ] = "",
+    surfaces: Annotated[
+        bool, typer.Option(help="Take the names of surfaces as AOI names.", envvar="SHIFT_SURFACES")
+    ] = False,
+    aoi_map: AoiMap = None,
+    source: Source = "pupil",
+    chunk: Chunk = 30,
+    url: Url = URL,
+) -> None:
+    """Forward the gaze of Pupil Core (Pupil Capture) into a session until Ctrl-C, with Pupil's own time.
+
+    \b
+    shift-mesh source pupil --session s1 --surface screen
+    shift-mesh source pupil --session s1 --surfaces --aoi-map 'coffee cup=cup'
+    """
+    from shift_schemas.errors import InvalidSettings
+    from shift_sources.files.options import aoi_map_of
+    from shift_sources.live.pupil import PupilFeed, PupilOptions
+
+    if surface and surfaces:
+        raise InvalidSettings("give either --surface or --surfaces: points on one surface, or AOI names of all")
+    options = PupilOptions(address, surface, surfaces, tuple(aoi_map_of(aoi_map or ()).items()))
+    _run(lambda: PupilFeed(options), session, source, chunk, url)
+
+
+@app.command()
+def neon(
+    session: Session,
+    address: Annotated[
+        str, typer.Option(help="Address of the companion phone; left out: the only one.", envvar="SHIFT_ADDRESS")
+    ] = "",
+    screen: Annotated[
+        str,
+        typer.Option(
+            help="Picture of the scene camera in pixels: Neon 1600x1200, Invisible 1088x1080.", envvar="SHIFT_SCREEN"
+        ),
+    ] = "1600x1200",
+    source: Source = "neon",
+    chunk: Chunk = 30,
+    url: Url = URL,
+) -> None:
+    """Forward the gaze of Neon or Invisible into a session until Ctrl-C, with the phone's own time.
+
+    Gaze is in the picture of the scene camera, which moves with the head: move the AOIs with it, or use a screen.
+
+    \b
+    shift-mesh source neon --session s1
+    shift-mesh source neon --session s1 --address 192.168.1.20
+    """
+    from shift_sources.live.neon import SCENE, NeonFeed, NeonOptions
+
+    options = NeonOptions(address, screen_size(screen) or SCENE)
+    _run(lambda: NeonFeed(options), session, source, chunk, url)
 
 
 app.command("file")(gaze_command.play)

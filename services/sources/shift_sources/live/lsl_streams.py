@@ -70,13 +70,11 @@ class Stream(NamedTuple):
 
 
 class _Eye(NamedTuple):
-    """The channels of one eye, or of both together; None where there is none."""
+    """The channels of the point of one eye, or of both together; ``valid`` is None where there is none."""
 
     x: int
     y: int
     valid: int | None
-    pupil: int | None
-    openness: int | None
 
 
 class GazeMapping(NamedTuple):
@@ -85,6 +83,8 @@ class GazeMapping(NamedTuple):
     left: _Eye | None
     right: _Eye | None
     both: _Eye | None
+    eyes: tuple[int | None, ...]
+    """The channels of :class:`Eyes`, in its order."""
     confidence: int | None
     object_id: int | None
     width: float
@@ -95,7 +95,10 @@ class GazeMapping(NamedTuple):
 
     def sample(self, t: float, values: Sequence[Any]) -> Sample:
         """Return the sample: the mean of the eyes that are valid, 0..1 from the upper left corner."""
-        eyes = self._eyes(values)
+        eyes = Eyes(
+            *(_positive(values[i], name) if i is not None else None
+              for i, name in zip(self.eyes, Eyes._fields, strict=True))
+        )  # fmt: skip
         if self.confidence is not None and not _at_least(values[self.confidence], LEAST_CONFIDENCE):
             return lost_sample(t, eyes)
         points = [point for eye in (self.left, self.right, self.both) if eye and (point := self._point(eye, values))]
@@ -119,14 +122,6 @@ class GazeMapping(NamedTuple):
         if eye.valid is not None and not _at_least(values[eye.valid], 0.5):
             return None
         return x, y
-
-    def _eyes(self, values: Sequence[Any]) -> Eyes:
-        found: list[float | None] = []
-        for kind in ("pupil", "openness"):
-            for eye in (self.left, self.right):
-                channel = getattr(eye, kind) if eye is not None else None
-                found.append(_positive(values[channel], kind) if channel is not None else None)
-        return Eyes(*found)
 
 
 def mapping_of(stream: Stream, screen: ScreenSize | None = None, unit: str = "", origin: str = "") -> GazeMapping:
@@ -165,6 +160,7 @@ def mapping_of(stream: Stream, screen: ScreenSize | None = None, unit: str = "",
     flip = bool(pairs) and (origin or _origin_of(channels[pairs[0].y])) == "bottom-left"
     return GazeMapping(
         found[LEFT], found[RIGHT], found[BOTH] if found[LEFT] is None and found[RIGHT] is None else None,
+        tuple(_of(channels, *name.split("_")) for name in Eyes._fields),
         _first(channels, lambda c: c.type == "Confidence" or c.label.lower() == "confidence"), object_id, width, height,
         flip,
     )  # fmt: skip
@@ -177,18 +173,20 @@ def _eye_of(channels: Sequence[Channel], eye: str) -> _Eye | None:
     x, y = (_first(channels, lambda c, axis=axis: _axis(c) == axis and side_of(c) == eye) for axis in "xy")
     if x is None or y is None:
         return None
+    return _Eye(x, y, _of(channels, "valid", eye))
 
-    def of(what: str) -> int | None:
-        return _first(channels, lambda c: _kind(c) == what and side_of(c) == eye)
 
-    return _Eye(x, y, of("valid"), of("pupil"), of("openness"))
+def _of(channels: Sequence[Channel], kind: str, eye: str) -> int | None:
+    return _first(channels, lambda c: _kind(c) == kind and side_of(c) == eye)
 
 
 LABELS_X = re.compile(
     r"x|norm_pos_x|(gaze_?)?x|(left|right)_x|(left|right)eyex|x\.position_on_display_area\.gaze_point\.(left|right)_eye"
 )
 """The labels of x of Pupil Labs, App-TobiiPro, App-EyeLink and TittaLSL."""
-LABELS_Y = re.compile(LABELS_X.pattern.replace("x", "y").replace("eyey", "eyey"))
+LABELS_Y = re.compile(
+    r"y|norm_pos_y|(gaze_?)?y|(left|right)_y|(left|right)eyey|y\.position_on_display_area\.gaze_point\.(left|right)_eye"
+)
 
 
 def _axis(channel: Channel) -> str:
@@ -252,7 +250,7 @@ def _at_least(value: float, least: float) -> bool:
     return math.isfinite(value) and value >= least
 
 
-def _positive(value: float, kind: str) -> float | None:
-    if not math.isfinite(value) or value < 0 or (kind == "pupil" and value == 0):
+def _positive(value: float, name: str) -> float | None:
+    if not math.isfinite(value) or value < 0 or (name.startswith("pupil") and value == 0):
         return None
     return float(value)
