@@ -13,6 +13,8 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 import pytest
+import zenoh
+from shift_runtime.bus.zenoh_config import zenoh_config
 from support.free_ports import free_port
 from support.whole_mesh import LiveMesh
 
@@ -109,3 +111,12 @@ def test_another_server_on_the_gateway_s_port_is_told_apart(mesh: LiveMesh, anot
 def test_an_endpoint_that_is_none_is_a_finding(mesh: LiveMesh, endpoint: str) -> None:
     done = doctor("--url", mesh.url, "--zenoh", endpoint, "--data", str(mesh.data))
     assert done.returncode == 1
+
+
+def test_gaze_topic_of_a_ros_graph_is_found_with_how_to_connect_it(mesh: LiveMesh) -> None:
+    token = "@ros2_lv/0/zid/0/10/MP/%/%/tracker/%humans%gaze/hri_msgs::msg::dds_::Gaze_/RIHS01_1/::,10:,:,:,,"
+    with zenoh.open(zenoh_config("client", connect=mesh.zenoh)) as session:
+        held = session.liveliness().declare_token(token)
+        done = doctor(*flags_of(mesh), "--json")
+        held.undeclare()
+    assert "ROS 2 topic /humans/gaze (hri_msgs/msg/Gaze)" in [s["what"] for s in json.loads(done.stdout)["sources"]]

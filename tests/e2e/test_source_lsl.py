@@ -168,3 +168,16 @@ while True:
     assert by_event["decision"]["cognitive_state"] == decision["cognitive_state"]
     assert by_event["reward"]["reward"] == report["reward"]
     assert by_event["end"] == {"event": "end", "session": "out"}
+
+
+def test_doctor_finds_the_stream_and_says_how_to_connect_it(mesh: LiveMesh, tmp_path: Path) -> None:
+    words = ("--url", mesh.url, "--zenoh", mesh.zenoh)
+    with outlet(tmp_path, "gaze", "--name", "My eyes"):
+        time.sleep(1)
+        line = [sys.executable, "-m", "shift_cli.main", "doctor", *words]
+        done = subprocess.run(line, capture_output=True, text=True, env=environment(tmp_path), timeout=60)
+        found = subprocess.run([*line, "--json"], capture_output=True, text=True, env=environment(tmp_path), timeout=60)
+    assert "connect it with: shift-mesh source lsl --session S --name 'My eyes'" in done.stdout
+    (source_,) = json.loads(found.stdout)["sources"]
+    assert source_["what"].startswith("Lab Streaming Layer: 'My eyes', type Gaze")
+    assert done.returncode == 0

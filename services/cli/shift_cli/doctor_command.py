@@ -6,9 +6,14 @@ import json
 import os
 import socket
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from shift_cli.source_search import FoundSource
 
 
 class Finding(NamedTuple):
@@ -25,9 +30,14 @@ def doctor(
     data: Annotated[
         Path | None, typer.Option(help="The data folder; left out: the one that the mesh uses.", envvar="SHIFT_DATA")
     ] = None,
+    sources: Annotated[
+        bool, typer.Option(help="Look for gaze sources as well: streams, devices, ROS topics.", envvar="SHIFT_SOURCES")
+    ] = True,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document.", envvar="SHIFT_JSON")] = False,
 ) -> None:
     """Check whether every part of the mesh can be reached, and say why not. The exit code is 1 if a check fails.
+
+    It also looks for gaze sources, and says how to connect each. To find none is not a failure.
 
     \b
     shift-mesh doctor
@@ -36,9 +46,13 @@ def doctor(
     ready, findings = _services(url)
     findings = [_router(zenoh), *findings, *_links(ready), _folder(data, ready)]
     if as_json:
-        typer.echo(json.dumps({"fine": all(f.fine for f in findings), "findings": [f._asdict() for f in findings]}))
+        found = [source._asdict() for source in _sources(zenoh)] if sources else []
+        document = {"fine": all(f.fine for f in findings), "findings": [f._asdict() for f in findings]}
+        typer.echo(json.dumps({**document, "sources": found}))
     else:
         _print(findings)
+        if sources:
+            _print_sources(zenoh)
     raise typer.Exit(0 if all(f.fine for f in findings) else 1)
 
 
@@ -52,6 +66,20 @@ def _print(findings: list[Finding]) -> None:
     for found in findings:
         table.add_row("[green]ok[/]" if found.fine else "[red]no[/]", found.what, found.detail)
     Console().print(table)
+
+
+def _sources(router: str) -> Iterator[FoundSource]:
+    from shift_cli.source_search import found_sources
+
+    return found_sources(router)
+
+
+def _print_sources(router: str) -> None:
+    found = list(_sources(router))
+    for source in found:
+        typer.echo(f"gaze source: {source.what}\n    connect it with: {source.connect}")
+    if not found:
+        typer.echo("gaze sources: none found; docs/trackers.md says how each eye tracker is connected")
 
 
 def _router(zenoh: str) -> Finding:

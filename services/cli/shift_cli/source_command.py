@@ -192,7 +192,7 @@ def neon(
     _run(lambda: NeonFeed(options), session, source, chunk, url)
 
 
-app.command("file")(gaze_command.play)
+app.command("file", help=(gaze_command.play.__doc__ or "").replace("gaze play", "source file"))(gaze_command.play)
 
 
 def _run(open_feed: Callable[[], Feed], session: str, source: str, chunk: int, url: str) -> None:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import structlog
@@ -50,12 +53,23 @@ class LslOptions:
     origin: str = ""
 
 
+CONFIGURATIONS = ("lsl_api.cfg", "~/lsl_api/lsl_api.cfg", "/etc/lsl_api/lsl_api.cfg")
+"""Where liblsl looks for its configuration, after the file that LSLAPICFG names."""
+WARNINGS_ONLY = "[log]\nlevel = -1\n"
+
+
+@cache
 def load() -> Any:
-    """Return the module ``pylsl``. Raise :class:`InvalidSettings` if it is not installed or has no library."""
+    """Return the module ``pylsl``. Raise :class:`InvalidSettings` if it is not installed or has no library.
+
+    Without a configuration of one's own, liblsl says warnings and errors only.
+    """
     try:
         import pylsl
     except (ImportError, RuntimeError) as e:
         raise InvalidSettings(f"{INSTALL} ({e})") from e
+    if "LSLAPICFG" not in os.environ and not any(Path(name).expanduser().is_file() for name in CONFIGURATIONS):
+        pylsl.set_config_content(WARNINGS_ONLY)
     return pylsl
 
 
@@ -177,9 +191,9 @@ class _TextStream:
     """A stream of markers, which may not be there yet."""
 
     def __init__(self, pylsl: Any, name: str) -> None:
-        self._pylsl, self._name = pylsl, name
+        self._pylsl = pylsl
         self.inlet: Any = None
-        self._looked = -FIND_S
+        self._resolver = pylsl.ContinuousResolver("name", name)
         self._offset_s, self._measured = 0.0, -CORRECT_EVERY_S
 
     def read(self, wait_s: float = 0.0) -> list[tuple[str, float]]:
@@ -203,10 +217,7 @@ class _TextStream:
         return self._offset_s
 
     def _found(self) -> bool:
-        if time.monotonic() - self._looked < FIND_S:
-            return False
-        found = self._pylsl.resolve_byprop("name", self._name, 1, 0.3)
-        self._looked = time.monotonic()
+        found = self._resolver.results()
         if found:
             self.inlet = self._pylsl.StreamInlet(found[0], max_buflen=BUFFER_S, recover=bool(found[0].source_id()))
             self.inlet.open_stream(timeout=10.0)
