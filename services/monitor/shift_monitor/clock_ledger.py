@@ -100,15 +100,20 @@ EMPTY_LEDGER = ClockLedger()
 
 
 def count_applied(
-    ledger: ClockLedger, chunk: GazeChunk, times: list[int], missing: int, restarted: bool, now: Stamp
-) -> ClockLedger:
-    """Return the ledger after a chunk with samples at ``times``, ns, before which so many chunks are missing."""
+    ledger: ClockLedger, chunk: GazeChunk, times: list[int], missing: int, restarted: bool, now: Stamp,
+    by_second: bool = True,
+) -> ClockLedger:  # fmt: skip
+    """Return the ledger after a chunk with samples at ``times``, ns, before which so many chunks are missing.
+
+    ``by_second`` is false in format 5, in which every arrival counts for the drift.
+    """
     if chunk.round_trip_s is not None or chunk.offset_s is not None:
         ledger = _with_measured(ledger, chunk)
     last_ns = None if restarted else ledger.last_ns
     before = times if last_ns is None else [last_ns, *times]
     gap_ns = max(map(sub, before[1:], before), default=0)
-    arrivals = _with_arrival(NO_ARRIVALS if restarted else ledger.arrivals, times[-1], now)
+    with_arrival = _with_arrival if by_second else _with_every_arrival
+    arrivals = with_arrival(NO_ARRIVALS if restarted else ledger.arrivals, times[-1], now)
     # written out, because dataclasses.replace takes three times as long, and this runs for each chunk
     return ClockLedger(
         ledger.chunks + 1, ledger.samples + len(times), ledger.late, ledger.missing + missing,
@@ -175,6 +180,18 @@ def _with_arrival(before: Arrivals, own_ns: int, now: Stamp) -> Arrivals:
     )  # fmt: skip
 
 
+def _with_every_arrival(before: Arrivals, own_ns: int, now: Stamp) -> Arrivals:
+    """Return the arrivals of format 5: each one is in the sums, and ``chunks`` is not counted."""
+    offset_ns = now.ns - own_ns
+    if before.count == 0:
+        return Arrivals(own_ns, now.ns, count=1, offset_ns=offset_ns)
+    own, mesh = (own_ns - before.first_ns) / NS, (now.ns - before.first_stamp_ns) / NS
+    return Arrivals(
+        before.first_ns, before.first_stamp_ns, 0, before.count + 1, *_added(_sums(before), own, mesh), mesh,
+        offset_ns=min(before.offset_ns, offset_ns),
+    )  # fmt: skip
+
+
 def _sums(a: Arrivals) -> tuple[float, float, float, float]:
     return a.own, a.mesh, a.own_mesh, a.mesh_mesh
 
@@ -209,7 +226,7 @@ def clock_fact(
         restarts=ledger.restarts,
         rate_hz=intervals * NS / ledger.span_ns if ledger.span_ns and intervals > 0 else None,
         longest_gap_s=ledger.longest_gap_ns / NS,
-        offset_s=arrivals.offset_ns / NS if arrivals.chunks else None,
+        offset_s=arrivals.offset_ns / NS if arrivals.chunks or arrivals.count else None,
         drift_ppm=_drift_ppm(arrivals),
         round_trip_s=ledger.round_trip_s, source_offset_s=ledger.source_offset_s,
         segments=_segments(ledger) if with_segments else None,

@@ -217,7 +217,9 @@ def _apply_chunk(onto: Continuation, chunk: GazeChunk, times: list[int], now: St
     missing = missing_chunks(stream.numbering, chunk.seq)
     dropped = min(state.dropped + missing, LARGEST_COUNT)
     ledgers = with_ledger(
-        state, chunk.source, lambda ledger: count_applied(ledger, chunk, times, missing, onto.restarted, now)
+        state,
+        chunk.source,
+        lambda ledger: count_applied(ledger, chunk, times, missing, onto.restarted, now, by_second=state.format >= 6),
     )
     jumps = jump_warnings(stream.last_ns, times[0])
     spacings = next_spacings(stream.spacings, stream.last_ns, times)
