@@ -82,8 +82,11 @@ def apply_fixation_dwell(
     attention: Attention, account: GazeAccount, output: FixationUpdate, prepared: PreparedStudy, areas: AreasOverTime
 ) -> tuple[Attention, GazeAccount]:
     """Apply the dwell of the samples inside a fixation, each on the AOI that was at its filtered position then."""
-    at = areas.at
-    dwells = [Dwell(area_at(at(t_ns), x, y), t_ns, duration_ns) for t_ns, x, y, duration_ns in output.dwells]
+    first, at = areas.first, areas.at
+    if areas.layouts:
+        dwells = [Dwell(area_at(at(t_ns), x, y), t_ns, duration_ns) for t_ns, x, y, duration_ns in output.dwells]
+    else:  # written out: most studies have AOIs that stand still, and this runs for each sample
+        dwells = [Dwell(area_at(first, x, y), t_ns, duration_ns) for t_ns, x, y, duration_ns in output.dwells]
     return _apply(dwells, attention, account, prepared, gap_ns=prepared.rule.gap_ns)
 
 
@@ -117,7 +120,7 @@ def apply_names(
             attention = mark_aoi_seen(attention)
     attention, account = _apply(dwells, attention, stream.account, prepared, gap_ns=0)
     account = count_samples(account, times, repeat(ON_STIMULUS, len(times)), longest_ns)
-    recent = count_recent(stream.recent, times, repeat(True, len(times)))
+    recent = count_recent(stream.recent, times, [True] * len(times))
     return replace(stream, last_ns=last_ns, named=named, account=account, recent=recent), attention
 
 

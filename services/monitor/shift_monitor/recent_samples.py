@@ -6,7 +6,8 @@ chunks does not change it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from bisect import bisect_left
+from collections.abc import Sequence
 from typing import NamedTuple
 
 STEP_NS = 100_000_000
@@ -26,18 +27,21 @@ class RecentSamples(NamedTuple):
 NO_SAMPLES = RecentSamples()
 
 
-def count_recent(recent: RecentSamples, times: Iterable[int], valid: Iterable[bool]) -> RecentSamples:
+def count_recent(recent: RecentSamples, times: Sequence[int], valid: Sequence[bool]) -> RecentSamples:
     """Return the counts after these samples; ``times`` are in ns, rise, and follow all samples before."""
     last, counts = recent.last, list(recent.counts)
-    for t_ns, is_valid in zip(times, valid, strict=True):
-        step = t_ns // STEP_NS
+    begin, total = 0, len(times)
+    while begin < total:
+        step = times[begin] // STEP_NS
+        end = bisect_left(times, (step + 1) * STEP_NS, begin)
         if not counts:
             counts, last = [(0, 0)], step
         elif step > last:
             counts = [*counts, *[(0, 0)] * min(step - last, STEPS)][-STEPS:]
             last = step
         samples, valid_ones = counts[-1]
-        counts[-1] = (samples + 1, valid_ones + is_valid)
+        counts[-1] = (samples + end - begin, valid_ones + sum(valid[begin:end]))
+        begin = end
     return RecentSamples(last, tuple(counts))
 
 
