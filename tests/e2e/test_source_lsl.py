@@ -76,6 +76,27 @@ def test_every_sample_is_recorded_in_order_over_restarts_and_steps_of_the_clock(
     assert clock.round_trip_s < 0.1
 
 
+def test_stream_without_a_source_id_and_the_mesh_come_back(mesh: LiveMesh, tmp_path: Path) -> None:
+    with RestClient(mesh.url, patience_s=60) as shift:
+        shift.start("P01", session="anonymous")
+        with source(mesh, tmp_path, "lsl", "--session", "anonymous") as process:
+            for first in (0, 900):
+                words = ("--rate", "300", "--count", "900", "--first", str(first), "--source-id", "")
+                with outlet(tmp_path, "gaze", *words) as stream:
+                    time.sleep(1.5)
+                    mesh.kill("shift_gateway" if first else "shift_monitor")
+                    assert stream.stdout is not None
+                    assert json.loads(stream.stdout.readline())["first"] == first
+                    time.sleep(0.5)
+            mesh.wait_ready()
+            said = stopped(process)
+        assert "1800 samples, 1800 kept; connected again 1 times" in said
+        assert said.count("the stream is lost") <= 2
+        shift.end("anonymous")
+    points = [p for f in recorded(mesh, "anonymous") if isinstance(f, Gaze) for p in zip(f.x, f.y, strict=True)]
+    assert [number_of(x, y) for x, y in points] == list(range(1800))
+
+
 def test_names_markers_and_the_list_of_streams(mesh: LiveMesh, tmp_path: Path) -> None:
     with RestClient(mesh.url) as shift:
         shift.start("P01", session="named", study={"study": "s", "aois": [{"name": "cup", "rectangle": [0, 0, 1, 1]}]})

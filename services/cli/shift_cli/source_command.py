@@ -199,12 +199,15 @@ def _run(open_feed: Callable[[], Feed], session: str, source: str, chunk: int, u
     """Forward a feed until Ctrl-C or SIGTERM, and say what became of its samples."""
     import asyncio
 
+    from shift_runtime.logs import configure_logs
+    from shift_runtime.settings import read_settings
     from shift_schemas.errors import InvalidSettings, check_id
 
     if not session:
         raise InvalidSettings("say which session gets the gaze, with --session")
     check_id("--session", session)
     check_id("--source", source)
+    configure_logs("source", read_settings())
     totals = asyncio.run(_forward(open_feed, session, source, chunk, url))
     typer.echo(totals.sentence, err=True)
     if totals.lost:

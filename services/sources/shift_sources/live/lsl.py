@@ -96,6 +96,7 @@ class LslFeed:
         self.reconnects = -1
         self._inlet: Any = None
         self._gaze: Stream | None = None
+        self._lost = False
         self._mapping: GazeMapping | None = None
         self._names = dict(options.aoi_map)
         wanted = [name for name in (options.markers, options.aoi_stream) if name]
@@ -156,10 +157,14 @@ class LslFeed:
 
     def _find_again(self) -> None:
         """Look for the lost stream for a second; the next reading goes on with that."""
-        log.warning("the stream is lost; it is looked for", stream=self._gaze.name if self._gaze else "")
-        for info in self._find(0.0):
-            self._connect(info)
-            return
+        if not self._lost:
+            log.warning("the stream is lost; it is looked for", stream=self._gaze.name if self._gaze else "")
+        self._lost = True
+        found = self._find(FIND_S)
+        if found:
+            self._connect(found[0])
+            self._lost = False
+            log.info("the stream is there again")
 
     def _sample(self, t: float, row: Sequence[Any], named: bool) -> Sample:
         assert self._mapping is not None
