@@ -97,3 +97,23 @@ def test_a_bridge_that_stops_answers_the_request_that_waits(
         assert not success
         assert json.loads(message)["kind"] == "unavailable"
         assert "stopping" in json.loads(message)["detail"]
+
+
+@BOTH
+def test_aois_move_with_the_gaze_of_a_ros_source(name: str, backend: str, mesh: LiveMesh, tmp_path: Path) -> None:
+    session = f"moves-{backend}"
+    with Bridge(mesh.zenoh, tmp_path, backend, session=session, task="grasp") as bridge, peer(name, bridge) as robot:
+        robot.ask("service", "/shift/next_strategy")
+        place = {"name": "left", "rectangle": [0.8, 0.0, 1.0, 1.0]}
+        hidden = {"name": "right", "visible": False}
+        gaze = [{"t": i / 50, "x": 0.9, "y": 0.5} for i in range(100)]
+        lines = {"aois": [{"t": 0.0, "aois": [place, hidden]}], "gaze": gaze}
+        for topic, messages in lines.items():
+            path = tmp_path / f"{topic}.jsonl"
+            path.write_text("\n".join(map(json.dumps, messages)))
+            robot.ask("play", f"/shift/{topic}", str(path), 100.0)
+            time.sleep(0.5)
+        assert robot.decide() is not None
+        found = httpx.get(f"{mesh.url}/v1/sessions/{session}/observation").json()["gaze"]
+    assert found["aoi"] == "left"
+    assert found["weights"]["left"] > found["weights"]["right"]

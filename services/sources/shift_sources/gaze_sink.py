@@ -1,12 +1,10 @@
-"""Where gaze of a source goes: into the mesh, from within it or through the gateway."""
+"""Where gaze of a source goes. Programs that are part of the mesh send it to the monitor."""
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any, Protocol
 
 from shift_runtime.mesh_api import MeshApi
-from shift_runtime.rest_client import RestClient
 from shift_schemas.errors import Unavailable
 from shift_schemas.messages import GazeChunk
 
@@ -38,19 +36,3 @@ class MeshSink:
         if not await read_model.reader.pull("monitor"):
             raise Unavailable("the monitor does not answer, so the last number of this gaze source is not known")
         return view.observation.seen.gaze.get(source, -1) + 1 if view.observation else 0
-
-
-class GatewaySink:
-    """A sink of a program outside of the mesh. The client's patience is how long it waits for the mesh."""
-
-    def __init__(self, rest: RestClient) -> None:
-        self._rest = rest
-
-    async def gaze(self, session: str, chunk: GazeChunk) -> Any:
-        """Send a chunk to the gateway."""
-        return await asyncio.to_thread(self._rest.gaze, session, chunk)
-
-    async def next_seq(self, session: str, source: str) -> int:
-        """Return the next number, as an observation has seen it."""
-        observation = await asyncio.to_thread(self._rest.observation, session)
-        return int(observation["seen"]["gaze"].get(source, -1)) + 1

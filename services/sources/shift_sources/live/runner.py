@@ -13,8 +13,8 @@ from shift_schemas.messages import Mark
 
 from shift_sources.gaze_batching import GazeArrival
 from shift_sources.gaze_forwarder import Batching, GazeForwarder
-from shift_sources.gaze_sink import GatewaySink
 from shift_sources.live.feed import Chunker, Feed
+from shift_sources.live.gateway_sink import GatewaySink
 
 log = structlog.get_logger()
 LAST_SAMPLES_S = 20.0
