@@ -40,6 +40,14 @@ def stopped(process: subprocess.Popen[str]) -> str:
     return process.communicate(timeout=40)[1]
 
 
+def wait_for_end(*outlets: subprocess.Popen[str]) -> None:
+    """Wait until each outlet says that it has sent everything, and a moment for what is on its way."""
+    for each in outlets:
+        assert each.stdout is not None
+        assert each.stdout.readline()
+    time.sleep(1.0)
+
+
 def recorded(mesh: LiveMesh, session: str) -> list[Any]:
     path = mesh.data / "recordings" / f"{session}.mcap"
     report = verify(path)
@@ -102,8 +110,8 @@ def test_names_markers_and_the_list_of_streams(mesh: LiveMesh, tmp_path: Path) -
         shift.start("P01", session="named", study={"study": "s", "aois": [{"name": "cup", "rectangle": [0, 0, 1, 1]}]})
         words = ("gaze", "--rate", "100", "--count", "400")
         with (
-            outlet(tmp_path, *words),
-            outlet(tmp_path, "texts", "light on", "light off", "--name", "Events", "--source-id", "events"),
+            outlet(tmp_path, *words) as eyes,
+            outlet(tmp_path, "texts", "light on", "light off", "--name", "Events", "--source-id", "events") as events,
             source(mesh, tmp_path, "lsl", "--list") as listing,
         ):
             lines = listing.communicate(timeout=30)[0]
@@ -111,7 +119,7 @@ def test_names_markers_and_the_list_of_streams(mesh: LiveMesh, tmp_path: Path) -
             assert "'Events', type Markers" in lines
             options = ("--aoi", "--aoi-map", "1=cup", "--aoi-map", "0=", "--markers", "Events")
             with source(mesh, tmp_path, "lsl", "--session", "named", *options) as process:
-                time.sleep(6)
+                wait_for_end(eyes, events)
                 assert "2 markers" in stopped(process)
         shift.end("named")
     found = recorded(mesh, "named")
@@ -126,10 +134,12 @@ def test_aoi_names_of_a_stream_of_texts_are_said_again(mesh: LiveMesh, tmp_path:
     with RestClient(mesh.url) as shift:
         shift.start("P01", session="texts", study=study)
         with (
-            outlet(tmp_path, "texts", "cup", "pot", "--name", "Looks", "--source-id", "looks", "--pause", "2.2"),
+            outlet(
+                tmp_path, "texts", "cup", "pot", "--name", "Looks", "--source-id", "looks", "--pause", "2.2"
+            ) as looks,
             source(mesh, tmp_path, "lsl", "--session", "texts", "--aoi-stream", "Looks") as process,
         ):
-            time.sleep(7)
+            wait_for_end(looks)
             stopped(process)
         gaze = shift.observation("texts")["gaze"]
         shift.end("texts")
