@@ -28,6 +28,8 @@ class GazeArrival(NamedTuple):
     session: str | None
     chunk: GazeChunk
     numbered: bool
+    anew: bool = False
+    """Whether the source is known to have set its clock back before it."""
 
 
 class GazeBuffer:
@@ -50,7 +52,7 @@ class GazeBuffer:
         """
         t, source = arrival.chunk.t, arrival.chunk.source
         last = self._last_t.get(source)
-        if not arrival.numbered and last is not None and last - RESTART_S < t[0] <= last:
+        if not (arrival.numbered or arrival.anew) and last is not None and last - RESTART_S < t[0] <= last:
             rule = f"t must rise; the sample before was at {last} s, {source}'s clock"
             raise MalformedMessage(f"gaze: t: {rule}", (FieldError(field="t", value=shorten(t[0]), rule=rule),))
         self._last_t[source] = t[-1]

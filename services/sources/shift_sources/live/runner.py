@@ -11,7 +11,6 @@ from shift_runtime.rest_client import RestClient
 from shift_schemas.errors import Conflict, ShiftError, UnknownThing
 from shift_schemas.messages import Mark
 
-from shift_sources.gaze_batching import GazeArrival
 from shift_sources.gaze_forwarder import Batching, GazeForwarder
 from shift_sources.live.feed import Chunker, Feed
 from shift_sources.live.gateway_sink import GatewaySink
@@ -84,9 +83,9 @@ class LiveSource:
                 if (now := self._feed.about) != about:
                     about = now
                     tell(about)
-                for chunk in self._chunker.chunks(batch):
-                    self.totals.received += len(chunk.t)
-                    forwarder.put(GazeArrival(None, chunk, numbered=False))
+                for arrival in self._chunker.arrivals(batch):
+                    self.totals.received += len(arrival.chunk.t)
+                    forwarder.put(arrival)
                 for text in batch.markers:
                     self._markers.put_nowait(text)
             await forwarder.flush(LAST_SAMPLES_S)
