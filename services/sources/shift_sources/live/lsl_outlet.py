@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -14,6 +15,8 @@ from shift_sources.live.lsl import load
 
 SUBJECTS = ("decision", "estimate", "performance", "session")
 ENDED = "ended"
+LINGER_S = 2.0
+"""How long the stream stays after its last marker, s: liblsl does not say when a marker has been sent."""
 
 
 def marker_of(subject: str, fact: dict[str, Any]) -> dict[str, Any] | None:
@@ -55,6 +58,7 @@ def publish(url: str, session: str, name: str, tell: Callable[[str], None]) -> N
             if said is not None:
                 outlet.push_sample([json.dumps(said, ensure_ascii=False)])
                 if said["event"] == "end":
+                    time.sleep(LINGER_S)
                     return
     except KeyboardInterrupt:
         pass
